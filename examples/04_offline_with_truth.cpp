@@ -16,12 +16,7 @@ int run(const std::string& name, const char* file) {
   twofold::FrameView frame;
   while (source.next(frame)) slam.push(frame);
 
-  std::vector<twofold::StampedPose> trajectory;
-  const auto summary = slam.finish();
-  for (const auto& pose : summary.trajectory) {
-    if (pose.map_part != summary.trajectory.front().map_part) continue;  // another world
-    trajectory.push_back({pose.t_ns, pose.T_world_camera});
-  }
+  const std::vector<twofold::StampedPose> trajectory = slam.finish().trajectory();  // of the largest map part
   if (file != nullptr) twofold::save_trajectory(file, trajectory);
 
   const twofold::TrajectoryError error = twofold::compare(trajectory, source.ground_truth());

@@ -12,7 +12,6 @@
 #include <deque>
 #include <exception>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -69,7 +68,6 @@ class Node {
   Node(const twofold::CameraRig& rig, const twofold::Pose& T_rectified_raw)
       : T_rectified_raw_(T_rectified_raw), slam_(rig, {.live = true}) {
     slam_.on_pose([this](const twofold::PoseEstimate& pose) { queue_.put(pose); });
-    slam_.on_event([this](const twofold::MapEvent& event) { events_.put(event); });
     publisher_ = std::jthread([this] { publish_all(); });
   }
   ~Node() {
@@ -109,23 +107,7 @@ class Node {
       if (status != twofold::QueueStatus::kItem) continue;  // no frame came for a while
       if (const std::uint64_t missed = queue_.take_missed(); missed > 0)
         std::printf("publishing is too slow: %llu are missing\n", static_cast<unsigned long long>(missed));
-      if (const auto* pose = std::get_if<twofold::PoseEstimate>(&item)) {
-        correct_until(pose->frame);
-        publish(*pose, stamp_of(pose->t_ns));
-      }
-    }
-  }
-
-  /// Events are told before the pose of their frame. They have a queue of their own: poses may be left out
-  /// when publishing is too slow, but without one of these map -> odom would be wrong for good.
-  void correct_until(std::int64_t frame) {
-    for (;;) {
-      twofold::PoseOrEvent item;
-      if (!event_ && events_.next(item, 0) == twofold::QueueStatus::kItem)
-        event_ = std::get<twofold::MapEvent>(item);
-      if (!event_ || event_->frame > frame) return;
-      correct(*event_);
-      event_.reset();
+      if (const auto* pose = std::get_if<twofold::PoseEstimate>(&item)) publish(*pose, stamp_of(pose->t_ns));
     }
   }
 
@@ -146,34 +128,32 @@ class Node {
     return under_way_.empty() ? 0 : under_way_.front().second;
   }
 
-  /// The map was corrected: the camera's pose jumps in it. In the frame odom it must not (REP 105), so that
-  /// the transform from map to odom jumps instead. The same formula holds when the camera found itself again
-  /// or goes on in another map part: odom goes on where the last pose was, and the way in between, which
-  /// nobody saw, is missing in it. Corrections below a centimetre and 0.2 degrees have no event: odom jumps
-  /// by those.
-  void correct(const twofold::MapEvent& event) {
-    const bool placed_before = event.map_part_before != twofold::kNoId;
-    const twofold::Pose T_after_before =
-        placed_before ? compose(event.T_world_camera_after, inverse(event.T_world_camera_before))
-                      : twofold::Pose{};
-    T_map_odom_ = compose(T_after_before, T_map_odom_);
-    map_part_ = event.map_part;
-    const twofold::Pose T = in_robot_axes(T_map_odom_);
-    std::printf("%s: map_%u -> odom  %.3f %.3f %.3f\n", to_string(event.kind), map_part_, T.t[0], T.t[1],
-                T.t[2]);
+  /// When the map is corrected the camera's pose jumps in it. In odom it must not (REP 105), so that the
+  /// transform from map to odom jumps instead. A node sends that with each pose; this prints it when it has
+  /// moved by a centimetre.
+  void tell_transform(const twofold::PoseEstimate& pose) {
+    const twofold::Pose T_map_odom = in_robot_axes(compose(pose.T_world_camera, inverse(pose.T_odom_camera)));
+    const twofold::Pose moved = compose(inverse(T_map_odom_), T_map_odom);
+    constexpr double kTold = 0.01;
+    if (pose.map_part == map_part_ && std::hypot(moved.t[0], moved.t[1], moved.t[2]) < kTold) return;
+    std::printf("map_%u -> odom  %.3f %.3f %.3f\n", pose.map_part, T_map_odom.t[0], T_map_odom.t[1],
+                T_map_odom.t[2]);
+    T_map_odom_ = T_map_odom;
+    map_part_ = pose.map_part;
   }
 
-  /// To be replaced by the middleware's: this prints. The world is the camera at the start of its map part,
-  /// no gravity: x of odom is where it looked then. Map parts have worlds of their own: each is a map frame
-  /// of its own, "map_" and its part, which `correct` ties to odom.
+  /// To be replaced by the middleware's: this prints. odom begins as the camera at its first pose, no
+  /// gravity: x is where it looked then. Map parts have worlds of their own: each is a map frame of its own,
+  /// "map_" and its part.
   void publish(const twofold::PoseEstimate& pose, std::int64_t stamp_ns) {
     if (pose.state != twofold::TrackingState::kTracked) return;
-    if (pose.map_part != map_part_) map_part_ = pose.map_part;  // the first one, which no event announces
     ++published_;
-    const twofold::Pose T_odom_camera = compose(inverse(T_map_odom_), pose.T_world_camera);
-    const twofold::Pose T_odom_raw = in_robot_axes(compose(T_odom_camera, T_rectified_raw_));
-    // Of the pose relative to reference_keyframe: right for odometry, too small for a pose in the map.
-    const Covariance covariance = along_axes_of_parent(pose.covariance, compose(kRobotCamera, T_odom_camera));
+    tell_transform(pose);
+    const twofold::Pose T_odom_raw = in_robot_axes(compose(pose.T_odom_camera, T_rectified_raw_));
+    // Of the pose relative to reference_keyframe. Drift is not in it: a filter that fuses this with other
+    // odometry should take differences of poses (robot_localization: `differential`).
+    const Covariance covariance =
+        along_axes_of_parent(pose.covariance, compose(kRobotCamera, pose.T_odom_camera));
     std::printf("%lld.%09lld  map_%u odom  x %7.3f m, y %7.3f m, z %7.3f m",
                 static_cast<long long>(stamp_ns / 1'000'000'000),
                 static_cast<long long>(stamp_ns % 1'000'000'000), map_part_, T_odom_raw.t[0], T_odom_raw.t[1],
@@ -190,13 +170,11 @@ class Node {
   std::deque<std::pair<std::int64_t, std::int64_t>> under_way_;  // time of the frame, stamp of its message
   std::atomic<int> published_{0};
   const twofold::Pose T_rectified_raw_;
-  // The publisher's: in the camera's axes, as all of Twofold's.
+  // The publisher's: as it was told last, in the robot's axes.
   twofold::Pose T_map_odom_;
   std::uint32_t map_part_ = twofold::kNoId;
   std::vector<std::string> errors_;
-  twofold::PoseQueue queue_;                // of poses
-  twofold::PoseQueue events_;               // far fewer: 512 of them are never behind
-  std::optional<twofold::MapEvent> event_;  // the publisher's: the next one
+  twofold::PoseQueue queue_;
   twofold::Slam slam_;
   std::jthread publisher_;  // last: it ends before what it uses
 };

@@ -146,7 +146,7 @@ void bind_estimate(py::module_& module) {
       .def_readonly("state", &PoseEstimate::state, "TrackingState: tracked, lost or unplaced.")
       .def_property_readonly(
           "tracked", [](const PoseEstimate& pose) { return pose.state == TrackingState::kTracked; },
-          "Whether the pose is known; without it, what follows `points` means nothing.")
+          "Whether the pose is known; without it, poses, ids, covariance and velocity mean nothing.")
       .def_readonly("keyframe", &PoseEstimate::keyframe, "Whether it was proposed as a keyframe of the map.")
       .def_readonly("effort", &PoseEstimate::effort, "Effort level; 0: nothing was left out.")
       .def_property_readonly(
@@ -156,13 +156,21 @@ void bind_estimate(py::module_& module) {
                     "Those over the points looked for, 0 to 1.")
       .def_readonly("T_world_camera", &PoseEstimate::T_world_camera,
                     "Pose of the left camera [m] in the world of `map_part`.")
-      .def_readonly(
-          "map_part", &PoseEstimate::map_part,
-          "Name of the part: the keyframe it began with, which may be gone. Parts have worlds of their own.")
-      .def_readonly("reference_keyframe", &PoseEstimate::reference_keyframe,
-                    "Id of the keyframe that the pose is known against.")
+      .def_property_readonly(
+          "map_part", [](const PoseEstimate& pose) { return known_id(pose.map_part); },
+          "Id of the map part, whose world T_world_camera is in: that of its first keyframe, which may be "
+          "gone. "
+          "None: not\n"
+          "tracked.")
+      .def_property_readonly(
+          "reference_keyframe", [](const PoseEstimate& pose) { return known_id(pose.reference_keyframe); },
+          "Id of the keyframe that the pose is known against; None: not tracked.")
       .def_readonly("T_reference_camera", &PoseEstimate::T_reference_camera,
                     "Pose relative to reference_keyframe [m]: this survives corrections of the map.")
+      .def_readonly("T_odom_camera", &PoseEstimate::T_odom_camera,
+                    "Odometry: a pose [m] in a frame that no correction of the map moves. Drift accumulates; "
+                    "map to odometry\n"
+                    "is T_world_camera * T_odom_camera.inverse().")
       .def_property_readonly(
           "covariance",
           [](const py::object& self) {
@@ -195,10 +203,6 @@ void bind_estimate(py::module_& module) {
       });
 }
 
-std::optional<std::uint32_t> known_id(std::uint32_t id) {
-  return id == kNoId ? std::nullopt : std::optional(id);
-}
-
 void bind_event(py::module_& module) {
   py::enum_<MapEventKind>(module, "MapEventKind", "Why the camera's pose jumped.")
       .value("OPTIMISATION", MapEventKind::kOptimisation, "a round of the double window")
@@ -213,16 +217,22 @@ void bind_event(py::module_& module) {
       .def_readonly("frame", &MapEvent::frame, "The first that saw it.")
       .def_readonly("t_ns", &MapEvent::t_ns, "That frame's time [ns].")
       .def_readonly("map_version", &MapEvent::map_version, "The corrected version of the map.")
-      .def_readonly("keyframe", &MapEvent::keyframe, "Reference keyframe of that frame.")
-      .def_readonly("map_part_before", &MapEvent::map_part_before, "Part the camera was in; NO_ID: none.")
-      .def_readonly("map_part", &MapEvent::map_part, "Part it is in now.")
+      .def_property_readonly(
+          "keyframe", [](const MapEvent& event) { return known_id(event.keyframe); },
+          "Reference keyframe of that frame; None: it is lost.")
+      .def_property_readonly(
+          "map_part_before", [](const MapEvent& event) { return known_id(event.map_part_before); },
+          "Part the camera was in; None: it was in none yet.")
+      .def_property_readonly(
+          "map_part", [](const MapEvent& event) { return known_id(event.map_part); }, "Part it is in now.")
       .def_readonly("T_world_camera_before", &MapEvent::T_world_camera_before,
-                    "Pose of the last tracked frame as it was told [m].")
+                    "Pose of the last tracked frame as it was told [m], in the world of map_part_before.")
       .def_readonly(
           "T_world_camera_after", &MapEvent::T_world_camera_after,
-          "Where the corrected map has it [m]; after a relocalisation, the frame that found itself.")
+          "Where the corrected map has it [m]; after a relocalisation or in a new part, the frame that found "
+          "itself.")
       .def_readonly("moved", &MapEvent::moved,
-                    "Distance between the two [m]; of no meaning across map parts.")
+                    "Distance between the two [m]; 0 across map parts, whose worlds share nothing.")
       .def_readonly("turned", &MapEvent::turned, "Angle between the two [rad]; likewise.")
       .def_property_readonly(
           "loop_from", [](const MapEvent& event) { return known_id(event.loop_from); },

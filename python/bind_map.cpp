@@ -60,8 +60,9 @@ void define_tables(py::class_<MapRows>& rows) {
           "(N,) with fields id, anchor (keyframe it was first seen in), observers (keyframes that see it), "
           "part "
           "(whose world it is in),\n"
-          "position (3,) [m], covariance (9,): 3x3 row by row [m^2]; without covariance zeros, at a tenth of "
-          "the time.")
+          "position (3,) [m], covariance (9,): 3x3 row by row [m^2], NaN where the measurements do not "
+          "determine the point;\n"
+          "without covariance all of it NaN, at a tenth of the time.")
       .def(
           "edges",
           [](const py::object& self) {
@@ -90,6 +91,16 @@ void define_tables(py::class_<MapRows>& rows) {
           "(N,) with fields id, keyframes (their number); one when everything is connected.");
 }
 
+using PoseAndPart = std::optional<std::pair<Pose, std::uint32_t>>;
+
+PoseAndPart pose_and_part(const std::optional<MapSnapshot::CameraPose>& pose) {
+  return pose ? PoseAndPart({pose->T_world_camera, pose->map_part}) : std::nullopt;
+}
+
+PoseAndPart camera_pose(const MapRows& self, const PoseEstimate& estimate) {
+  return pose_and_part(self.snapshot.camera_pose(estimate));
+}
+
 }  // namespace
 
 void bind_map(py::module_& module) {
@@ -103,10 +114,26 @@ void bind_map(py::module_& module) {
   rows.def_property_readonly(
           "version", [](const MapRows& self) { return self.snapshot.version(); }, "Grows with every version.")
       .def_property_readonly(
-          "reference", [](const MapRows& self) { return self.snapshot.reference(); },
-          "Keyframe in the middle of the windows; NO_ID in an empty map.");
+          "reference", [](const MapRows& self) { return known_id(self.snapshot.reference()); },
+          "The keyframe that the windows are around: the newest, or the one that the camera came back to. "
+          "None "
+          "in an empty\n"
+          "map.");
   define_tables(rows);
-  rows.def(
+  rows.def("camera_pose", &camera_pose, py::arg("estimate"),
+           "Pose [m] that this version has for the camera of a frame tracked at any time, by way of its "
+           "reference keyframe or\n"
+           "what stands for that now, and the id of its map part: (Pose, part). None: the frame was not "
+           "tracked, "
+           "or nobody\n"
+           "knows (twofold/map.hpp).")
+      .def(
+          "keyframe_pose",
+          [](const MapRows& self, std::uint32_t id) {
+            return pose_and_part(self.snapshot.keyframe_pose(id));
+          },
+          py::arg("id"), "Likewise of a keyframe by its id, which may have been culled.")
+      .def(
           "memory_bytes",
           [](const MapRows& self) {
             const py::gil_scoped_release unlocked;

@@ -162,7 +162,7 @@ void bind_push(py::module_& module) {
 /// The poses of each map part, parts in the order of their ids.
 std::map<std::uint32_t, PoseList> trajectories_of(const SlamSummary& summary) {
   std::map<std::uint32_t, PoseList> trajectories;
-  for (const auto& pose : summary.trajectory)
+  for (const auto& pose : summary.poses)
     trajectories[pose.map_part].poses.push_back({pose.t_ns, pose.T_world_camera});
   return trajectories;
 }
@@ -203,13 +203,7 @@ void bind_summary(py::module_& module) {
       .def_readonly("lost", &SlamSummary::lost, "Frames without a pose, unplaced ones included.")
       .def_readonly("dropped", &SlamSummary::dropped, "Frames there was no time or room for.")
       .def_property_readonly(
-          "trajectory",
-          [](const SlamSummary& self) {
-            PoseList longest;
-            for (auto& [part, trajectory] : trajectories_of(self))
-              if (trajectory.poses.size() > longest.poses.size()) longest = std::move(trajectory);
-            return longest;
-          },
+          "trajectory", [](const SlamSummary& self) { return PoseList{self.trajectory()}; },
           "Poses of the tracked frames in the final map: those of the map part that has most of them.")
       .def_property_readonly("trajectories", &trajectories_of,
                              "The same of every map part, by the part's id.")
@@ -227,10 +221,10 @@ using MaybePath = std::optional<std::filesystem::path>;
 std::unique_ptr<SlamWithUpdates, DeleteUnlocked> make_slam(
     const CameraRig& rig, RunMode mode, bool live, double speed, std::optional<LateFrames> late,
     const MaybePath& map, bool localise_only, bool places, const MaybePath& vocabulary,
-    const MaybePath& checkpoint, double checkpoint_period, const MaybePath& schedule, int inner_window,
-    int outer_window, int frame_buffers, std::optional<int> tracker_cpu, std::optional<int> mapper_cpu,
-    std::optional<int> loop_closer_cpu, std::optional<int> fifo_priority, const MaybePath& run_folder,
-    std::int64_t kept_frames, const MaybePath& trace) {
+    bool global_adjustment, const MaybePath& checkpoint, double checkpoint_period, const MaybePath& schedule,
+    int inner_window, int outer_window, int frame_buffers, std::optional<int> tracker_cpu,
+    std::optional<int> mapper_cpu, std::optional<int> loop_closer_cpu, std::optional<int> fifo_priority,
+    const MaybePath& run_folder, std::int64_t kept_frames, const MaybePath& trace) {
   const SlamOptions options{mode,
                             live,
                             speed,
@@ -239,6 +233,7 @@ std::unique_ptr<SlamWithUpdates, DeleteUnlocked> make_slam(
                             localise_only,
                             places,
                             vocabulary.value_or(""),
+                            global_adjustment,
                             checkpoint.value_or(""),
                             checkpoint_period,
                             schedule.value_or(""),
@@ -299,13 +294,13 @@ void define_constructor(SlamClass& slam) {
            py::arg("live") = d.live, py::arg("speed") = d.speed, py::arg("late") = d.late,
            py::arg("map") = py::none(), py::arg("localise_only") = d.localise_only,
            py::arg("places") = d.places, py::arg("vocabulary") = py::none(),
-           py::arg("checkpoint") = py::none(), py::arg("checkpoint_period") = d.checkpoint_period,
-           py::arg("schedule") = py::none(), py::arg("inner_window") = d.inner_window,
-           py::arg("outer_window") = d.outer_window, py::arg("frame_buffers") = d.frame_buffers,
-           py::arg("tracker_cpu") = d.tracker_cpu, py::arg("mapper_cpu") = d.mapper_cpu,
-           py::arg("loop_closer_cpu") = d.loop_closer_cpu, py::arg("fifo_priority") = d.fifo_priority,
-           py::arg("run_folder") = py::none(), py::arg("kept_frames") = d.kept_frames,
-           py::arg("trace") = py::none());
+           py::arg("global_adjustment") = d.global_adjustment, py::arg("checkpoint") = py::none(),
+           py::arg("checkpoint_period") = d.checkpoint_period, py::arg("schedule") = py::none(),
+           py::arg("inner_window") = d.inner_window, py::arg("outer_window") = d.outer_window,
+           py::arg("frame_buffers") = d.frame_buffers, py::arg("tracker_cpu") = d.tracker_cpu,
+           py::arg("mapper_cpu") = d.mapper_cpu, py::arg("loop_closer_cpu") = d.loop_closer_cpu,
+           py::arg("fifo_priority") = d.fifo_priority, py::arg("run_folder") = py::none(),
+           py::arg("kept_frames") = d.kept_frames, py::arg("trace") = py::none());
 }
 
 void define_frames(SlamClass& slam) {

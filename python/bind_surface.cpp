@@ -228,8 +228,9 @@ void bind_map_surface(py::module_& module) {
   snapshot
       .def_property_readonly("map_version", &SurfaceSnapshot::map_version,
                              "Of the map that it fits; 0: of nothing.")
-      .def_property_readonly("map_part", &SurfaceSnapshot::map_part,
-                             "Whose world positions are in; NO_ID: none.");
+      .def_property_readonly(
+          "map_part", [](const SurfaceSnapshot& self) { return known_id(self.map_part()); },
+          "Whose world positions are in; None: of nothing.");
   bind_questions(snapshot, [](const SurfaceSnapshot& self, const auto& question) { return question(self); });
   py::class_<OfMap>(module, "MapSurface",
                     "The surface of a run's keyframes, which moves with its map: as `twofold run --surface` "

@@ -2,7 +2,17 @@
 
 #include <pybind11/pybind11.h>
 
+#include <cstdint>
+#include <optional>
+
+#include "twofold/estimate.hpp"
+
 namespace twofold::python {
+
+/// None in Python where the public face has kNoId.
+inline std::optional<std::uint32_t> known_id(std::uint32_t id) {
+  return id == kNoId ? std::nullopt : std::optional(id);
+}
 
 // One function a header of the public face, in the order in which they need each other.
 void bind_types(pybind11::module_& module);

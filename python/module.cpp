@@ -4,7 +4,6 @@
 PYBIND11_MODULE(_core, module) {
   module.doc() = "What package twofold is made of: libtwofold's classes.";
   module.attr("__version__") = twofold::version();
-  module.attr("NO_ID") = twofold::kNoId;
   twofold::python::bind_types(module);
   twofold::python::bind_estimates(module);
   twofold::python::bind_evaluation(module);

@@ -74,9 +74,10 @@ Rig to_rig(const CameraRig& rig) {
   inside.kind = kind_of(rig.sensor);
   inside.camera = {rig.fx, rig.fy, rig.cx, rig.cy, rig.width, rig.height};
   if (rig.sensor != Sensor::kMono) {
-    expect(positive(rig.baseline) && rig.baseline <= kLongestBaseline, "baseline", "in (0, 20]",
+    const bool left_out = rig.sensor == Sensor::kRgbd && rig.baseline == 0;
+    inside.baseline = left_out ? Calibration{}.virtual_baseline : rig.baseline;
+    expect(positive(inside.baseline) && inside.baseline <= kLongestBaseline, "baseline", "in (0, 20]",
            rig.baseline);
-    inside.baseline = rig.baseline;
   }
   if (rig.readout)
     expect(*rig.readout >= 0 && *rig.readout <= kLongestReadout, "readout", "0 to 0.5", *rig.readout);

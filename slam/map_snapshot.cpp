@@ -62,6 +62,20 @@ std::uint32_t MapSnapshot::reference() const {
   return index(impl_->map->graph.reference());
 }
 
+std::optional<MapSnapshot::CameraPose> MapSnapshot::camera_pose(const PoseEstimate& estimate) const {
+  if (estimate.state != TrackingState::kTracked) return std::nullopt;
+  auto pose = keyframe_pose(estimate.reference_keyframe);
+  if (pose) pose->T_world_camera = compose(pose->T_world_camera, estimate.T_reference_camera);
+  return pose;
+}
+
+std::optional<MapSnapshot::CameraPose> MapSnapshot::keyframe_pose(std::uint32_t id) const {
+  const GraphSnapshot& graph = impl_->map->graph;
+  const KeyframeId keyframe{id};
+  if (!graph.contains(keyframe) || !graph.live_replacement(keyframe)) return std::nullopt;
+  return CameraPose{index(graph.part(keyframe)), to_pose(graph.T_k_w(keyframe).inverse())};
+}
+
 std::vector<MapSnapshot::Keyframe> MapSnapshot::keyframes() const {
   const MapVersion& map = *impl_->map;
   std::vector<std::uint8_t> window(map.graph.keyframe_count(), 0);

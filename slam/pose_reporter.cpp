@@ -64,6 +64,7 @@ MapEvent event_of(MapEventKind kind, const PoseEstimate& now) {
 void set_poses(const SE3& T_w_before, const SE3& T_w_after, MapEvent& event) {
   event.T_world_camera_before = to_pose(T_w_before);
   event.T_world_camera_after = to_pose(T_w_after);
+  if (event.map_part_before != event.map_part) return;
   event.moved = (T_w_after.translation() - T_w_before.translation()).norm();
   event.turned = (T_w_before.so3().inverse() * T_w_after.so3()).log().norm();
 }
@@ -110,9 +111,12 @@ PoseEstimate PoseReporter::next(const PoseReport& report, Events& events) {
     now.T_reference_camera = to_pose(record.T_c_ref.unpacked().inverse());
     find_covariance(report, now);
     if (const auto T_last_w = last_T_c_w(report)) {
+      const SE3 T_last_c = *T_last_w * T_c_w.inverse();
       const double dt = static_cast<double>(record.t_ns - last_.t_ns) * 1e-9;
-      Eigen::Map<Vector6>(now.velocity.data()) = (*T_last_w * T_c_w.inverse()).log() / dt;
+      Eigen::Map<Vector6>(now.velocity.data()) = T_last_c.log() / dt;
+      T_odom_c_ = T_odom_c_ * T_last_c;
     }
+    now.T_odom_camera = to_pose(T_odom_c_);
   }
   find_events(report, now, events);
   if (record.state == FrameState::kTracked) last_ = record;
@@ -163,9 +167,12 @@ void PoseReporter::find_events(const PoseReport& report, const PoseEstimate& now
   MapEvent& event = events.placing.emplace(
       event_of(new_part ? MapEventKind::kNewPart : MapEventKind::kRelocalisation, now));
   const SE3 T_w_now = to_se3(now.T_world_camera);
-  if (last_.state == FrameState::kTracked) event.map_part_before = index(last_.part_causal);
-  const auto T_last_w = last_T_c_w(report);
-  set_poses(T_last_w ? T_last_w->inverse() : T_w_now, T_w_now, event);
+  SE3 T_w_last = T_w_now;
+  if (last_.state == FrameState::kTracked) {
+    event.map_part_before = index(last_.part_causal);
+    T_w_last = last_T_c_w(report).value_or(last_.T_c_w_causal.unpacked()).inverse();
+  }
+  set_poses(T_w_last, T_w_now, event);
 }
 
 }  // namespace twofold

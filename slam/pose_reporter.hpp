@@ -47,6 +47,7 @@ class PoseReporter {
   // the first.
   FrameRecord last_;
   bool was_lost_ = false;
+  SE3 T_odom_c_;  // of the last tracked frame
 };
 
 }  // namespace twofold

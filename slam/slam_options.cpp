@@ -94,6 +94,7 @@ EngineOptions engine_options(const SlamOptions& options) {
   engine.localise_only = options.localise_only;
   engine.mapper.inner_window = options.inner_window;
   engine.mapper.outer_window = options.outer_window;
+  engine.mapper.global.enabled = options.global_adjustment;
   engine.frame_slots = static_cast<std::size_t>(options.frame_buffers);
   engine.logs.folder = options.run_folder;
   engine.logs.frames_in_memory = static_cast<std::size_t>(options.kept_frames);

@@ -30,6 +30,9 @@ void append_pose(std::string& line, const PoseEstimate& pose) {
                  list(T.t), list(T.q), pose.map_part, pose.reference_keyframe);
   fmt::format_to(out, R"(,"position_in_reference":[{}],"orientation_in_reference":[{}])", list(T_ref.t),
                  list(T_ref.q));
+  const Pose T_odom = without_minus_zeros(pose.T_odom_camera);
+  fmt::format_to(out, R"(,"position_in_odom":[{}],"orientation_in_odom":[{}])", list(T_odom.t),
+                 list(T_odom.q));
   fmt::format_to(out, R"(,"velocity":[{:.6g}])", list(pose.velocity));
   if (pose.covariance_known)
     fmt::format_to(out, R"(,"covariance":[{:.6g}])", list(pose.covariance));

@@ -23,6 +23,7 @@ std::string pose_text(const SE3& T) {
 
 /// Along the worst axis [m]; 0: not known.
 float worst_deviation(const MapSnapshot::Point& point) {
+  if (std::isnan(point.covariance[0])) return 0;
   Eigen::SelfAdjointEigenSolver<Matrix3> solver;
   solver.computeDirect(Eigen::Map<const Matrix3>(point.covariance.data()), Eigen::EigenvaluesOnly);
   return static_cast<float>(std::sqrt(std::max(0.0, solver.eigenvalues().maxCoeff())));

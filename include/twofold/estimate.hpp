@@ -39,16 +39,25 @@ struct PoseEstimate {
 
   // Of tracked frames only:
   /// Of the left camera as the frames show it: rectified ones are turned against the lens that took them
-  /// (FrameRectifier::T_rectified_raw). In the world of `map_part`, as the map has it now.
+  /// (FrameRectifier::T_rectified_raw). In the world of `map_part`, as version `map_version` of the map has
+  /// it.
   Pose T_world_camera;
-  /// Name of the part, whose world is its own: the keyframe it began with, which may be gone. Parts that join
-  /// bear one name, and keyframes older than it may be among them.
+  /// Id of the map part; each has a world frame of its own. It is the id of the part's first keyframe, which
+  /// may have been culled since. Parts that join share one id, so keyframes with smaller ids may belong to
+  /// it.
   std::uint32_t map_part = kNoId;
   std::uint32_t reference_keyframe = kNoId;
-  Pose T_reference_camera;  ///< relative to it: this survives corrections of the map
+  /// Relative to it: this survives corrections of the map (MapSnapshot::T_world_camera has where it is then).
+  Pose T_reference_camera;
+  /// In a frame that no correction of the map, and no new map part, moves: odometry, whose transform to the
+  /// map is T_world_camera * inverse(T_odom_camera). It begins at the first tracked frame; each one after
+  /// that adds its way since the frame tracked before, as the map has both, so that drift accumulates. Where
+  /// the map does not have the way, as when a lost camera goes on in another part, it stays where it was.
+  Pose T_odom_camera;
   /// 6x6 row by row, of delta in T_reference_camera * exp(delta), delta = (translation [m], rotation [rad])
   /// in the camera's axes: how well the camera is known relative to the reference keyframe. Where that
-  /// keyframe is in the world, and the drift on the way there, is not in it. It is as large as the residuals
+  /// keyframe is in the world, and the drift on the way there, is not in it: it is the covariance neither of
+  /// T_world_camera nor of T_odom_camera, which have drift. It is as large as the residuals
   /// of the last frames say, and allows for a rolling shutter's readout as long as that is not known: of a
   /// global shutter that CameraRig::readout does not name (0), single axes are up to 15 times too wide. What
   /// no residual shows, a wrong focal length or clock, is not in it. Otherwise honest within a factor of two
@@ -56,8 +65,8 @@ struct PoseEstimate {
   /// the frame that starts a map part: that frame defines the world. Not known (covariance_known is false:
   /// the measurements leave a direction open): all NaN.
   std::array<double, 36> covariance = unknown_covariance();
-  /// (linear [m/s], angular [rad/s]) in the camera's axes, since the frame tracked before; zero when there is
-  /// none.
+  /// (linear [m/s], angular [rad/s]) in the camera's axes: the mean since the frame tracked before, over the
+  /// whole gap after a loss; corrections of the map are not in it. Zero when there is no such frame.
   std::array<double, 6> velocity{};
 
   std::uint64_t map_version = 0;  ///< of the map that the frame was tracked against
@@ -90,9 +99,10 @@ struct MapEvent {
   std::uint32_t keyframe = kNoId;  ///< reference keyframe of that frame; kNoId: it is lost
   std::uint32_t map_part_before = kNoId;
   std::uint32_t map_part = kNoId;
+  /// Of the last tracked frame, in the world of `map_part_before`. Before the first one the same as after.
   Pose T_world_camera_before;
-  Pose T_world_camera_after;
-  double moved = 0;   ///< distance between the two [m]; of no meaning across map parts
+  Pose T_world_camera_after;  ///< in the world of `map_part`
+  double moved = 0;   ///< distance between the two [m]; 0 across map parts, whose worlds share nothing
   double turned = 0;  ///< angle between the two [rad]; likewise
 
   // What the correction did to the map; zero for kRelocalisation and kNewPart, which correct nothing. Where

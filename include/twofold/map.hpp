@@ -2,7 +2,9 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "twofold/estimate.hpp"
@@ -37,15 +39,22 @@ class TWOFOLD_API MapSnapshot {
     bool loaded = false;     ///< it was in the map that the run went on with (SlamOptions::map)
   };
 
+  /// Point::covariance of which nothing is known, as unknown_covariance() of a pose.
+  [[nodiscard]] static constexpr std::array<double, 9> unknown_point_covariance() {
+    std::array<double, 9> covariance{};
+    covariance.fill(std::numeric_limits<double>::quiet_NaN());
+    return covariance;
+  }
+
   struct Point {
     std::uint32_t id = kNoId;
     std::uint32_t anchor = kNoId;      ///< keyframe that it was first seen in; may be gone by now
     std::uint32_t part = kNoId;        ///< map part, whose world `position` is in
     std::uint32_t observers = 0;       ///< keyframes that see it
     std::array<double, 3> position{};  ///< in the world of its part [m]
-    /// 3x3 row by row [m^2], from all its measurements with the keyframes' poses taken as true. All zero,
-    /// which no point's is: not asked for, or the measurements do not determine the point.
-    std::array<double, 9> covariance{};
+    /// 3x3 row by row [m^2], from all its measurements with the keyframes' poses taken as true. All NaN: not
+    /// asked for, or the measurements do not determine the point.
+    std::array<double, 9> covariance = unknown_point_covariance();
   };
 
   enum class EdgeKind : std::uint8_t {
@@ -91,12 +100,27 @@ class TWOFOLD_API MapSnapshot {
   ~MapSnapshot();
 
   [[nodiscard]] std::uint64_t version() const;
-  /// Keyframe in the middle of the windows; kNoId in an empty map.
+  /// The keyframe that the windows are around: the newest, or the one that the camera came back to. kNoId in
+  /// an empty map.
   [[nodiscard]] std::uint32_t reference() const;
+
+  /// A camera in one version of the map.
+  struct CameraPose {
+    std::uint32_t map_part = kNoId;
+    Pose T_world_camera;
+  };
+  /// Where this version has the camera of a frame that was tracked at any other time: by way of its reference
+  /// keyframe, or, when that was culled, of the keyframe that stands for it now. Nothing: the frame was not
+  /// tracked; this version does not have its reference keyframe yet, which can be so for the newest frames;
+  /// or that was culled so long ago (thousands of keyframes) that nobody knows what it hung on. Takes a
+  /// microsecond.
+  [[nodiscard]] std::optional<CameraPose> camera_pose(const PoseEstimate& estimate) const;
+  /// Likewise of a keyframe by its id (PoseEstimate::reference_keyframe).
+  [[nodiscard]] std::optional<CameraPose> keyframe_pose(std::uint32_t id) const;
 
   // Each is made anew by its call, ascending by id, culled ones left out: O(size of the map).
   [[nodiscard]] std::vector<Keyframe> keyframes() const;
-  /// @param with_covariance  false leaves the covariances zero, at a tenth of the time
+  /// @param with_covariance  false leaves the covariances unknown, at a tenth of the time
   [[nodiscard]] std::vector<Point> points(bool with_covariance = true) const;
   [[nodiscard]] std::vector<Edge> edges() const;
   /// Loops that this run has closed by appearance, in the order they were found; none in a loaded map.

@@ -21,12 +21,15 @@ enum class QueueStatus : std::uint8_t {
 ///
 ///   PoseQueue queue;
 ///   slam.on_pose([&](const PoseEstimate& pose) { queue.put(pose); });
-///   ...
-///   PoseOrEvent item;
-///   while (queue.next(item) == QueueStatus::kItem) ...;  // on a thread of its own, until queue.close()
-///   slam.finish();  // before the queue is gone: until then it is filled
+///   std::jthread reader([&] {
+///     for (PoseOrEvent item; queue.next(item) == QueueStatus::kItem;) ...;
+///   });
+///   ... push all frames ...
+///   slam.finish();  // until then the queue is filled
+///   queue.close();  // the reader gets what is left, then the end
 ///
-/// Roles: one thread puts, one reads, one may wait for room; anyone closes and asks for what was missed.
+/// Roles: one thread at a time puts (callbacks of one Slam do), one reads, one may wait for room; anyone
+/// closes and asks for what was missed.
 /// put is wait-free: it copies into a ring of `capacity` items, and makes a system call only to wake a reader
 /// that sleeps. Full: the item is left out and counted.
 class TWOFOLD_API PoseQueue {

@@ -30,8 +30,9 @@ class TWOFOLD_API FrameRectifier {
 
   /// What the rectified frames are of.
   [[nodiscard]] const CameraRig& rig() const;
-  /// How the left camera that poses are of stands in the one that was calibrated: a rotation alone, identity
-  /// for images that are rectified already. A robot's extrinsics are of the latter:
+  /// Rotation from the calibrated left camera, as its lens took the images (raw), to the rectified one that
+  /// poses are of: p_rectified = T_rectified_raw * p_raw; identity for images that are rectified already. A
+  /// robot's extrinsics are of the raw camera:
   ///
   ///   T_world_raw = compose(estimate.T_world_camera, rectifier.T_rectified_raw())
   ///   T_world_body = compose(T_world_raw, inverse(T_body_raw))  // T_body_raw: how the camera is mounted

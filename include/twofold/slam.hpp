@@ -64,6 +64,9 @@ struct SlamOptions {
   /// Recognise places: closes large loops, finds a lost camera, joins map parts. Needed for `map`.
   bool places = true;
   std::filesystem::path vocabulary = {};  ///< instead of the built-in one
+  /// finish ends with a bundle adjustment of the whole map, for one camera, and for a rig that has recognised
+  /// a place, of up to 3,000 keyframes: about a millisecond each.
+  bool global_adjustment = true;
 
   /// Map file that is written again and again during the run, replaced atomically, by a thread that nobody
   /// waits for (in kDeterministic and kReplay within push): after a crash it has the map of the newest
@@ -90,11 +93,11 @@ struct SlamOptions {
   /// A folder that exists. trajectory_causal.txt (TUM form) and schedule.log (for `twofold run
   /// --replay-schedule`) grow in it and are whole, but for the last 0.1 s, however the process ends; what is
   /// remembered of each frame goes to its disk, so that memory does not grow with the time: not before
-  /// finish, which reads the poses into SlamSummary::trajectory. What stays in memory for the whole run are
+  /// finish, which reads the poses into SlamSummary::poses. What stays in memory for the whole run are
   /// the loops that were closed, some hundred bytes each (MapSnapshot::loops). A disk that is full or too
   /// slow is no reason to stop: Slam::errors says, while it runs, which file lost what. Empty: all in memory.
   std::filesystem::path run_folder = {};
-  /// Without a folder: how many of the newest frames have a pose in SlamSummary::trajectory, >= 1, at 176
+  /// Without a folder: how many of the newest frames have a pose in SlamSummary::poses, >= 1, at 176
   /// bytes each; older ones are forgotten. A million are nine hours at 30 Hz.
   std::int64_t kept_frames = 1'000'000;
 
@@ -146,7 +149,11 @@ struct SlamSummary {
     std::uint32_t map_part = kNoId;
     Pose T_world_camera;
   };
-  std::vector<FinalPose> trajectory;  ///< 72 bytes each: 190 MB for a day at 30 Hz
+  std::vector<FinalPose> poses;  ///< 72 bytes each: 190 MB for a day at 30 Hz
+  /// Those of one map part; of the part that has most of them, which is the whole run's unless a lost camera
+  /// went on in another one.
+  [[nodiscard]] TWOFOLD_API std::vector<StampedPose> trajectory(std::uint32_t map_part) const;
+  [[nodiscard]] TWOFOLD_API std::vector<StampedPose> trajectory() const;
   /// Stereo: rows that right images lie lower than left ones, taken back while tracking [px]; 0: none. The
   /// pair should be calibrated again.
   double row_offset = 0;
@@ -188,8 +195,9 @@ class TWOFOLD_API Slam {
   using FrameCallback = std::function<void(const PoseEstimate&, const FrameDetails&)>;
 
   /// Throws std::invalid_argument when rig or options make no sense, naming the field, and std::runtime_error
-  /// when a file cannot be used or the rig is not the map's. A processor or priority that the system refuses
-  /// is no error: SlamSummary::notes tells.
+  /// when a file cannot be used or the rig is not the map's: size, intrinsics and baseline must be the ones
+  /// it was made with, so that a camera that was calibrated again needs a new map. A processor or priority
+  /// that the system refuses is no error: SlamSummary::notes tells.
   Slam(const CameraRig& rig, const SlamOptions& options);
   /// Finishes, after end_pace.
   ~Slam();
@@ -211,13 +219,14 @@ class TWOFOLD_API Slam {
   /// or record, and do not wait for the pose ("frame listener").
   void on_frame(FrameCallback callback);
 
-  /// In a threaded run it waits for no thread of the engine, only for another caller inside push, has_room,
-  /// wait_for_room or finish, and for the library's own look at what is done, 20 times a second at most: as
-  /// long as it takes to copy the records of the frames done since, no more than there are buffers; in a
-  /// deterministic one or a replay it returns when the frame is tracked and mapped. Refused are images that
-  /// do not fit the rig, time stamps that do not increase, and frames after finish(). An exception of the
-  /// engine, as std::bad_alloc, comes out of push in a deterministic run; in a threaded one it ends the
-  /// thread it arose on, and errors() says so.
+  /// In a threaded run it never waits for tracking or mapping. It may wait briefly for the library's own
+  /// bookkeeping (20 times a second at most, no longer than it takes to copy the records of the frames done
+  /// since), and for another thread inside push, has_room, wait_for_room or finish: do not call finish on one
+  /// thread while another, which must not wait, goes on pushing. In a deterministic run or a replay it
+  /// returns when the frame is tracked and mapped. Refused are images that do not fit the rig, time stamps
+  /// that do not increase, and frames after finish(). An exception of the engine, as std::bad_alloc, comes
+  /// out of push in a deterministic run; in a threaded one it ends the thread it arose on, and errors() says
+  /// so.
   PushResult push(const FrameView& frame);
   /// Whether a push would find room now; without another pushing thread, it will. Without a pace (`live`,
   /// `speed`), also whether map and disk follow: a push is not dropped for their sake.
@@ -247,8 +256,9 @@ class TWOFOLD_API Slam {
   [[nodiscard]] MapSnapshot map() const;
   [[nodiscard]] HeldMaps held_maps() const;
   /// Writes the newest version to a map file, on this thread, while the run goes on. The file is
-  /// replaced atomically: a crash leaves either the old or the new version. Throws std::runtime_error naming
-  /// file and reason, also when there is no keyframe yet.
+  /// replaced atomically: a crash leaves either the old or the new version. All map parts go into one file,
+  /// each with its own world. Throws std::runtime_error naming file and reason, also when there is no
+  /// keyframe yet.
   void save_map(const std::filesystem::path& file) const;
 
   /// While paused, the map gets no keyframe: the camera is localised in what there is, as with localise_only,
@@ -266,8 +276,7 @@ class TWOFOLD_API Slam {
   [[nodiscard]] std::vector<std::string> errors() const;
 
   /// Tracks what is queued, with `speed` when its time has come (end_pace), makes all poses agree globally,
-  /// and ends the threads. With one camera, and with a rig that has recognised a place, that is a bundle
-  /// adjustment of the whole map of up to 3,000 keyframes: about a millisecond a keyframe. A second call
+  /// and ends the threads (SlamOptions::global_adjustment says what that takes). A second call
   /// gives the same answer. map() and save_map() then have the final map. The answer is a copy with all poses
   /// of the run (or those kept), and the Slam keeps one: the one place where memory grows with the time.
   SlamSummary finish();

@@ -11,12 +11,6 @@
 
 namespace twofold {
 
-/// Where the camera was at one time.
-struct StampedPose {
-  std::int64_t t_ns = 0;
-  Pose T_world_camera;
-};
-
 struct SourceSettings {
   std::filesystem::path calibration = {};  ///< instead of the recording's own; empty: its own
   bool preload = false;                    ///< decode everything into memory before the constructor returns
@@ -29,8 +23,8 @@ struct SourceSettings {
 /// replica:DIR, scannet:DIR, images:DIR, video:FILE, mcap:FILE, bag:FILE, v4l2:DEVICE, synthetic:SCENE, with
 /// ?key=value&key=value.
 ///
-/// Threads: every function may be called by any thread; those that ask for frames take turns. A move is
-/// nobody else's moment.
+/// Threads: every function may be called by any thread; those that ask for frames take turns. Moving a Source
+/// must not overlap any other call on it.
 class TWOFOLD_API Source {
  public:
   /// Throws std::runtime_error naming the file and what is wrong with it.
@@ -40,14 +34,16 @@ class TWOFOLD_API Source {
   Source& operator=(Source&&) noexcept;
 
   [[nodiscard]] const CameraRig& rig() const;
-  /// How the left camera that poses are of stands in the one that was calibrated, by the calibration that
-  /// this source uses: a rotation alone; the identity where it delivers the images as they came. Of several
-  /// calibrations that one could read, this is the right one for the poses of this source
-  /// (FrameRectifier::T_rectified_raw has the two lines to the pose of the body).
+  /// Rotation from the calibrated left camera, as its lens took the images, to the rectified one that poses
+  /// are of, by the calibration that this source uses: p_rectified = T_rectified_raw * p_raw; the identity
+  /// where it delivers the images as they came. Of several calibrations that one could read, this is the
+  /// right one for the poses of this source (FrameRectifier::T_rectified_raw has the two lines to the pose of
+  /// the body).
   [[nodiscard]] Pose T_rectified_raw() const;
   /// Frames in all, where that is known beforehand.
   [[nodiscard]] std::optional<std::int64_t> frame_count() const;
-  /// Frames come when they are taken, not when they are asked for.
+  /// Frames come when they are taken, not when they are asked for; their times are of CLOCK_MONOTONIC, as
+  /// SlamOptions::live needs them.
   [[nodiscard]] bool is_live() const;
   /// Of the rig's camera, in the order of time; empty when there is none.
   [[nodiscard]] const std::vector<StampedPose>& ground_truth() const;

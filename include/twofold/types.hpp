@@ -34,6 +34,12 @@ struct Pose {
 [[nodiscard]] TWOFOLD_API std::array<double, 3> transform(const Pose& T_a_b,
                                                           const std::array<double, 3>& p_b);
 
+/// Where the camera was at one time.
+struct StampedPose {
+  std::int64_t t_ns = 0;
+  Pose T_world_camera;
+};
+
 /// kMono: one camera. It is placed once it has moved enough to see depth (until then it is lost, and
 /// PoseEstimate::reason says what it waits for). Its map and poses are right up to their scale, in which the
 /// median depth of the first map is about one. In a map that a rig made (SlamOptions::map with localise_only)
@@ -44,14 +50,15 @@ enum class Sensor : std::uint8_t { kStereo, kRgbd, kMono };
 /// along x, so that corresponding points lie in the same row.
 struct CameraRig {
   Sensor sensor = Sensor::kStereo;
-  int width = 0;        ///< [px] 1 .. 16384
-  int height = 0;       ///< [px] likewise
-  double fx = 0;        ///< [px] > 0
-  double fy = 0;        ///< [px] > 0
-  double cx = 0;        ///< [px]
-  double cy = 0;        ///< [px]
-  double baseline = 0;  ///< [m] in (0, 20]; RGB-D: of the virtual right camera that turns depth into
-                        ///< disparity, say 0.08; kMono: unused
+  int width = 0;   ///< [px] 1 .. 16384
+  int height = 0;  ///< [px] likewise
+  double fx = 0;   ///< [px] > 0
+  double fy = 0;   ///< [px] > 0
+  double cx = 0;   ///< [px]
+  double cy = 0;   ///< [px]
+  /// Distance of the two cameras [m], in (0, 20]. RGB-D: of the virtual right camera that turns depth into
+  /// disparity; 0 takes 0.08, which need not be changed. kMono: unused.
+  double baseline = 0;
   /// Metres per unit of the depth image, > 0; stereo: of the depth that a surface is made of, which ends at
   /// 65535 of them.
   double depth_unit = 0.001;
@@ -82,10 +89,13 @@ struct ImageView {
 
 /// The images of one instant.
 struct FrameView {
-  std::int64_t t_ns = 0;  ///< when it was taken; must grow from frame to frame
-  ImageView left;         ///< grey or colour
-  ImageView right;        ///< stereo: as left
-  ImageView depth;        ///< RGB-D: kDepth16, registered to left
+  /// When it was taken: the middle of the exposure is best, of the middle row where rows are exposed one
+  /// after the other. A constant offset from that shifts all poses in time and changes nothing else. Must
+  /// grow from frame to frame.
+  std::int64_t t_ns = 0;
+  ImageView left;   ///< grey or colour
+  ImageView right;  ///< stereo: as left
+  ImageView depth;  ///< RGB-D: kDepth16, of the size of left and registered to it
   /// Keeps the pixels alive and unchanged: grey images and depth are then used where they are. Without it
   /// they are copied. It is let go of when the engine is done with the frame, at the latest in finish(), on
   /// any thread: one of the engine's, or one that is in a function of Slam. A deleter must not care which,

@@ -13,7 +13,6 @@ from ._cpu import check as _check_processor
 _check_processor()  # before the library is loaded
 
 from ._core import (  # noqa: E402
-    NO_ID,
     AlignBy,
     BoardCalibration,
     BoardCalibrator,
@@ -53,7 +52,6 @@ from ._run import Run, run
 from ._slam import Slam
 
 __all__ = [
-    "NO_ID",
     "AlignBy",
     "BoardCalibration",
     "BoardCalibrator",

@@ -84,6 +84,7 @@ class Slam(_core.Slam):
     localise_only=False        poses in that map, which does not change
     places=True                recognise places: large loops, lost cameras, map parts
     vocabulary=None            file instead of the built-in one
+    global_adjustment=True     finish() adjusts the whole map of one camera, or of a rig that has recognised a place: about 1 ms a keyframe
     checkpoint=None            map file that is written again and again during the run
     checkpoint_period=60       from one to the next [s]
     schedule=None              of RunMode.REPLAY: schedule.log of the run to repeat
@@ -93,7 +94,7 @@ class Slam(_core.Slam):
     tracker_cpu, mapper_cpu, loop_closer_cpu=None    pin the threads to these
     fifo_priority=None         SCHED_FIFO for the tracker, 1..99
     run_folder=None            folder in which trajectory_causal.txt and schedule.log grow
-    kept_frames=1_000_000      without one: how many of the newest frames have a pose in Summary.trajectory
+    kept_frames=1_000_000      without one: how many of the newest frames have a pose in Summary.trajectories
     trace=None                 file for ui.perfetto.dev, written by finish()
     ValueError and RuntimeError say what is wrong with them.
 

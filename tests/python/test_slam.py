@@ -85,6 +85,11 @@ def test_poses_come_from_the_queue_in_order(frames: list[twofold.Frame], rig: tw
     pose = poses[-1]
     assert pose.tracked and pose.covariance.shape == (6, 6) and pose.velocity.shape == (6,)
     np.testing.assert_allclose(pose.covariance, pose.covariance.T)
+    found = slam.map().camera_pose(pose)
+    assert found is not None and pose.map_part == found[1]
+    np.testing.assert_allclose(found[0].t, summary.trajectory.positions[-1], atol=1e-9)
+    np.testing.assert_allclose(pose.T_odom_camera.t, found[0].t, atol=0.02)
+    assert slam.map().keyframe_pose(10**6) is None
     assert "exposure to pose" in {time.stage for time in summary.timings}
 
 

@@ -89,7 +89,7 @@ def test_a_runs_surface_follows_its_map() -> None:
     with twofold.Slam(source.rig, mode=twofold.RunMode.DETERMINISTIC) as slam:
         surface = twofold.MapSurface(slam.map(), voxel=0.04)
         early = surface.snapshot()
-        assert early.map_part == twofold.NO_ID
+        assert early.map_part is None
         for frame in source:
             slam.push(frame)
             pose = slam.latest()

@@ -77,6 +77,46 @@ TEST_F(PoseReporterTest, ACorrectionOfTheMapIsNoMotion) {
   EXPECT_EQ(events_.correction->T_world_camera_after, to_pose(jump.inverse()));
 }
 
+TEST_F(PoseReporterTest, OdometryDoesNotJumpWhenTheMapDoes) {
+  const SE3 start(SO3::exp(Vector3(0, 0.3, 0)), Vector3(1, 2, 3));
+  EXPECT_EQ(report(tracked(0, start)).T_odom_camera, Pose{}) << "it begins where the camera is";
+  const SE3 step = SE3::exp((Vector6() << 0.1, 0, 0.2, 0, 0.05, 0).finished());
+  (void)report(tracked(1, step.inverse() * start));
+  const SE3 jump(SO3(), Vector3(0, 5, 0));  // of the map, as a loop makes it
+  writer_.set_pose(KeyframeId{0}, jump);
+  graph_ = writer_.publish();
+  const SE3 T_c_w_moved = step.inverse() * start * jump;
+  correction_ = {CorrectionReason::kLoopClosure, 1, kPeriod, PackedPose(), PackedPose(T_c_w_moved)};
+  const PoseEstimate pose = report(tracked(2, step.inverse() * T_c_w_moved));
+  EXPECT_LT((to_se3(pose.T_odom_camera).inverse() * step * step).log().norm(), 1e-9);
+}
+
+TEST_F(PoseReporterTest, OdometryGoesOnWhereItWasInAnotherPart) {
+  (void)report(tracked(0, SE3()));
+  const SE3 T_c_w(SO3(), Vector3(0, 0, -2));
+  const Pose before = report(tracked(1, T_c_w)).T_odom_camera;
+  EXPECT_NEAR(before.t[2], 2, 1e-12);
+  (void)report(lost(2));
+  FrameRecord record = tracked(3, SE3());
+  record.reference = record.part_causal = KeyframeId{1};
+  EXPECT_EQ(report(record).T_odom_camera, before);
+}
+
+TEST_F(PoseReporterTest, ANewPartsEventSaysWhereTheCameraWasInTheOldOne) {
+  const SE3 T_c_w(SO3(), Vector3(0, 0, -2));
+  (void)report(tracked(0, T_c_w));
+  (void)report(lost(1));
+  FrameRecord record = tracked(2, SE3());
+  record.reference = record.part_causal = KeyframeId{1};
+  (void)report(record);
+  ASSERT_TRUE(events_.placing);
+  EXPECT_EQ(events_.placing->map_part_before, 0U);
+  EXPECT_EQ(events_.placing->map_part, 1U);
+  EXPECT_EQ(events_.placing->T_world_camera_before, to_pose(T_c_w.inverse()));
+  EXPECT_EQ(events_.placing->T_world_camera_after, Pose{});
+  EXPECT_EQ(events_.placing->moved, 0) << "the two worlds share nothing";
+}
+
 TEST_F(PoseReporterTest, CovarianceIsTheInverseOfTheInformation) {
   Matrix6 A = Matrix6::Random();
   const Matrix6 information = A * A.transpose() + Matrix6::Identity();

@@ -56,6 +56,32 @@ TEST_F(SlamMapTest, TheMapHasItsKeyframesPointsEdgesAndWindows) {
   EXPECT_GT(map.memory_bytes(), map.points(false).size() * 256);
 }
 
+/// Poses that were told early are asked of the final map.
+TEST_F(SlamMapTest, ALaterVersionKnowsWhereEarlierFramesAre) {
+  Slam slam(rig(), {.mode = RunMode::kDeterministic, .inner_window = 2, .outer_window = 2});
+  std::vector<PoseEstimate> told;
+  slam.on_pose([&](const PoseEstimate& pose) { told.push_back(pose); });
+  push_all(slam);
+  const SlamSummary summary = slam.finish();
+  const MapSnapshot map = slam.map();
+  ASSERT_EQ(told.size(), summary.poses.size());
+  for (std::size_t n = 0; n < told.size(); ++n) {
+    const auto pose = map.camera_pose(told[n]);
+    ASSERT_TRUE(pose) << n;
+    EXPECT_EQ(pose->map_part, summary.poses[n].map_part);
+    for (int axis = 0; axis < 3; ++axis)
+      EXPECT_NEAR(pose->T_world_camera.t[static_cast<std::size_t>(axis)],
+                  summary.poses[n].T_world_camera.t[static_cast<std::size_t>(axis)], 1e-6)
+          << n;
+  }
+  for (const auto& keyframe : map.keyframes())
+    EXPECT_EQ(map.keyframe_pose(keyframe.id)->T_world_camera, keyframe.T_world_camera);
+  EXPECT_FALSE(map.camera_pose(PoseEstimate{})) << "it was not tracked";
+  EXPECT_FALSE(map.keyframe_pose(kNoId));
+  EXPECT_FALSE(map.keyframe_pose(1'000'000)) << "the map does not have it yet";
+  EXPECT_FALSE(MapSnapshot().camera_pose(told[0]));
+}
+
 TEST_F(SlamMapTest, CovariancesOfPointsGrowWithTheirDistance) {
   Slam slam(rig(), deterministic());
   push_all(slam);
@@ -68,6 +94,7 @@ TEST_F(SlamMapTest, CovariancesOfPointsGrowWithTheirDistance) {
     depth_and_deviation.emplace_back(std::hypot(point.position[0], point.position[1], point.position[2]),
                                      std::sqrt(variance));
   }
+  for (const auto& point : slam.map().points(false)) EXPECT_TRUE(std::isnan(point.covariance[0]));
   ASSERT_GT(depth_and_deviation.size(), 100U);
   std::sort(depth_and_deviation.begin(), depth_and_deviation.end());
   const auto mean_of = [&](auto member, std::size_t begin, std::size_t end) {

@@ -31,7 +31,7 @@ class SlamMonoTest : public testing::SlamRun {
   }
   static TrajectoryError error_of(const SlamSummary& summary, AlignBy align) {
     std::vector<StampedPose> estimate, truth;
-    for (const auto& pose : summary.trajectory) estimate.push_back({pose.t_ns, pose.T_world_camera});
+    for (const auto& pose : summary.poses) estimate.push_back({pose.t_ns, pose.T_world_camera});
     for (int i = 0; i < kFrames; ++i)
       truth.push_back({frames_->at(static_cast<std::size_t>(i)).t_ns, to_pose(T_c_w(i).inverse())});
     return compare(estimate, truth, {.align = align});

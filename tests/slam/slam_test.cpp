@@ -69,13 +69,13 @@ TEST_F(SlamTest, DeterministicRunsGiveTheEnginesBytes) {
   push_all(slam);
   const SlamSummary summary = slam.finish();
   ASSERT_EQ(poses.size(), expected.frames.size());
-  ASSERT_EQ(summary.trajectory.size(), expected.frames.size());
+  ASSERT_EQ(summary.poses.size(), expected.frames.size());
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const FrameRecord& record = expected.frames[i];
     EXPECT_EQ(poses[i].T_world_camera, to_pose(record.T_c_w_causal.unpacked().inverse())) << i;
     EXPECT_EQ(poses[i].map_version, record.snapshot_version);
     EXPECT_EQ(poses[i].points, record.inliers);
-    EXPECT_EQ(summary.trajectory[i].T_world_camera, to_pose(final_T_c_w(record, expected.graph).inverse()));
+    EXPECT_EQ(summary.poses[i].T_world_camera, to_pose(final_T_c_w(record, expected.graph).inverse()));
   }
   EXPECT_EQ(summary.frames, kFrames);
   EXPECT_EQ(summary.tracked, kFrames);
@@ -164,9 +164,9 @@ TEST_F(SlamTest, ARunFolderTakesTheTrajectoryAndTheSchedule) {
   push_all(in_memory);
   const SlamSummary summary = slam.finish(), expected = in_memory.finish();
   EXPECT_TRUE(summary.errors.empty());
-  ASSERT_EQ(summary.trajectory.size(), expected.trajectory.size());
-  for (std::size_t i = 0; i < summary.trajectory.size(); ++i)
-    EXPECT_EQ(summary.trajectory[i].T_world_camera, expected.trajectory[i].T_world_camera) << i;
+  ASSERT_EQ(summary.poses.size(), expected.poses.size());
+  for (std::size_t i = 0; i < summary.poses.size(); ++i)
+    EXPECT_EQ(summary.poses[i].T_world_camera, expected.poses[i].T_world_camera) << i;
   EXPECT_EQ(load_trajectory(folder.path() / "trajectory_causal.txt").size(),
             static_cast<std::size_t>(kFrames));
   std::ifstream file(folder / "schedule.log", std::ios::binary);
@@ -180,7 +180,7 @@ TEST_F(SlamTest, ARunOfTheLibraryIsReplayedByTheLibrary) {
   const ScratchFolder folder;
   const auto poses_of = [](const SlamSummary& summary) {
     std::vector<Pose> poses;
-    for (const auto& pose : summary.trajectory) poses.push_back(pose.T_world_camera);
+    for (const auto& pose : summary.poses) poses.push_back(pose.T_world_camera);
     return poses;
   };
   Slam threaded(rig(), {.run_folder = folder.path()});
@@ -429,7 +429,7 @@ TEST_F(SlamTest, ADiskThatIsFullIsSaidWhileItRunsAndNothingIsLostWhenThereIsRoom
   EXPECT_TRUE(slam.errors().empty()) << slam.errors()[0];
   const SlamSummary summary = slam.finish();
   EXPECT_TRUE(summary.errors.empty());
-  EXPECT_EQ(summary.trajectory.size(), 11U);
+  EXPECT_EQ(summary.poses.size(), 11U);
   EXPECT_EQ(read_tum_trajectory(folder.path() / "trajectory_causal.txt").size(), 11U);
 }
 
@@ -483,8 +483,8 @@ TEST(SlamSummary, LeavesOutFramesWhoseKeyframeWasCulledAndForgotten) {
     result.frames.push_back(record);
   }
   const SlamSummary summary = summarise(result);
-  ASSERT_EQ(summary.trajectory.size(), 1U);
-  EXPECT_EQ(summary.trajectory[0].t_ns, 0);
+  ASSERT_EQ(summary.poses.size(), 1U);
+  EXPECT_EQ(summary.poses[0].t_ns, 0);
 }
 
 TEST_F(SlamTest, ASlowCallbackIsAStageOfItsOwn) {
@@ -588,6 +588,10 @@ TEST_F(SlamTest, OptionsAndRigsThatMakeNoSenseAreNamed) {
   rgbd.sensor = Sensor::kRgbd;
   rgbd.depth_max = 0.1;
   expect(what_is_wrong(rgbd, {}), "rig.depth_max");
+  rgbd = rig();
+  rgbd.sensor = Sensor::kRgbd;
+  rgbd.baseline = 0;  // need not be said
+  EXPECT_EQ(what_is_wrong(rgbd, {}), "nothing");
   rgbd.depth_max = std::numeric_limits<double>::infinity();
   expect(what_is_wrong(rgbd, {}), "rig.depth_max must be finite");
   expect(what_is_wrong(rig(), {.localise_only = true}), "options.localise_only needs options.map");

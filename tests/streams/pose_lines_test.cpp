@@ -16,6 +16,7 @@ TEST(PoseLines, JsonHasAllThatIsKnownOfATrackedFrame) {
   pose.covariance = {};
   pose.covariance[35] = 0.125;
   pose.covariance_known = true;
+  pose.T_odom_camera = {{0, 0.8, 0, 0.6}, {3, 0.5, -2}};
   pose.velocity = {1, 2, 3, 4, 5, 6};
   pose.exposed_ns = 99;
   pose.latency_ns = 1500;
@@ -32,6 +33,8 @@ TEST(PoseLines, JsonHasAllThatIsKnownOfATrackedFrame) {
   EXPECT_EQ(line["reference_keyframe"], 2);
   EXPECT_EQ(line["covariance"].size(), 36U);
   EXPECT_EQ(line["covariance"][35], 0.125);
+  EXPECT_EQ(line["position_in_odom"], json({3.0, 0.5, -2.0}));
+  EXPECT_EQ(line["orientation_in_odom"], json({0.0, 0.8, 0.0, 0.6}));
   EXPECT_EQ(line["velocity"], json({1, 2, 3, 4, 5, 6}));
   EXPECT_EQ(line["exposed_ns"], 99);
   EXPECT_EQ(line["latency_ns"], 1500);
