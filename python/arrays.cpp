@@ -42,13 +42,15 @@ ImageView image_view(const py::object& object, const char* name, ImageFormat for
     throw py::type_error(std::string(name) + ": an image must be a numpy array");
   auto array = py::reinterpret_borrow<py::array>(object);
   const bool depth = format == ImageFormat::kDepth16;
-  const bool right_type = depth ? py::isinstance<py::array_t<std::uint16_t>>(array)
-                                : py::isinstance<py::array_t<std::uint8_t>>(array);
+  if (depth && py::isinstance<py::array_t<float>>(array)) format = ImageFormat::kDepth32F;
+  const bool right_type =
+      depth ? format == ImageFormat::kDepth32F || py::isinstance<py::array_t<std::uint16_t>>(array)
+            : py::isinstance<py::array_t<std::uint8_t>>(array);
   const bool colour = array.ndim() == 3 && array.shape(2) == 3 && !depth;
   if (!right_type || (array.ndim() != 2 && !colour)) {
-    throw py::value_error(
-        std::string(name) + ": must be " +
-        (depth ? "uint16 of shape (height, width)" : "uint8 of shape (height, width) or (height, width, 3)"));
+    throw py::value_error(std::string(name) + ": must be " +
+                          (depth ? "uint16 or float32 of shape (height, width)"
+                                 : "uint8 of shape (height, width) or (height, width, 3)"));
   }
   const py::ssize_t pixel_bytes = array.itemsize() * (colour ? 3 : 1);
   if (!lies_row_by_row(array, pixel_bytes)) {
@@ -66,6 +68,9 @@ py::object array_of(const ImageView& image, py::handle owner) {
   if (image.format == ImageFormat::kDepth16)
     return view_of(static_cast<const std::uint16_t*>(image.data), {image.height, image.width}, owner,
                    {image.stride, 2});
+  if (image.format == ImageFormat::kDepth32F)
+    return view_of(static_cast<const float*>(image.data), {image.height, image.width}, owner,
+                   {image.stride, 4});
   const auto* pixels = static_cast<const std::uint8_t*>(image.data);
   if (image.format == ImageFormat::kGrey8)
     return view_of(pixels, {image.height, image.width}, owner, {image.stride, 1});

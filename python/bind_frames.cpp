@@ -45,7 +45,8 @@ void bind_frame(py::module_& module) {
                           "The images of one instant.\n\n"
                           "Grey images (uint8, height x width) and depth (uint16, likewise) are used where "
                           "they are: do not write into\n"
-                          "them afterwards. Colour (uint8, height x width x 3) is turned to grey, a copy, "
+                          "them afterwards. Depth in metres (float32) is rounded to CameraRig.depth_unit in "
+                          "a copy. Colour (uint8, height x width x 3) is turned to grey, a copy, "
                           "when the frame is pushed. An\n"
                           "array whose rows do not lie row after row, pixel beside pixel (a transposed or "
                           "mirrored one), is copied here;\n"
@@ -58,8 +59,9 @@ void bind_frame(py::module_& module) {
       .def_property_readonly("left", &image_of<&FrameView::left>,
                              "A read-only view of the pixels: (height, width) uint8, or (height, width, 3).")
       .def_property_readonly("right", &image_of<&FrameView::right>, "The same, or None.")
-      .def_property_readonly("depth", &image_of<&FrameView::depth>,
-                             "(height, width) uint16 in units of CameraRig.depth_unit, read-only; or None.")
+      .def_property_readonly(
+          "depth", &image_of<&FrameView::depth>,
+          "(height, width) uint16 in units of CameraRig.depth_unit, or float32 [m], read-only; or None.")
       .def_property_readonly(
           "copied", [](const PythonFrame& frame) { return py::tuple(py::cast(frame.copied)); },
           "Names of the images that were copied when the frame was made.");

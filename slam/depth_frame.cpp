@@ -55,7 +55,7 @@ DepthFrame depth_frame(const Rig& rig, const FrameView& frame, double nearest_st
     images.depth = depth_of_pair(rig, frame, nearest_stereo);
   } else {
     expect_pixels("depth", frame.depth, true);
-    images.depth = pixels_of(frame.depth, frame.owner);
+    images.depth = depth_pixels_of(frame.depth, frame.owner, rig.depth_unit);
   }
   images.colour = colour_of(frame.left);
   if (const std::string defect = depth_defect(rig, images.depth, images.colour); !defect.empty())

@@ -39,7 +39,7 @@ Frame FrameIntake::take(const FrameView& view) {
   Frame frame;
   frame.t_ns = view.t_ns;
   frame.left = pixels_of(view.left, view.owner);
-  if (rig_.kind == SensorKind::kRgbd) frame.depth = pixels_of(view.depth, view.owner);
+  if (rig_.kind == SensorKind::kRgbd) frame.depth = depth_pixels_of(view.depth, view.owner, rig_.depth_unit);
   if (rig_.kind == SensorKind::kStereo) frame.right = pixels_of(view.right, view.owner);
   frame.index = skip(view);
   return frame;

@@ -15,8 +15,8 @@ class FrameIntake {
 
   /// Empty when the frame can be used; else one sentence that says what is wrong.
   [[nodiscard]] std::string refusal(const FrameView& view) const;
-  /// Of a frame that is not refused. It gets the next number. Grey images and depth stay where they are if
-  /// the view has an owner, which the frame then keeps; else they are copied.
+  /// Of a frame that is not refused. It gets the next number. Grey images and depth in units stay where they
+  /// are if the view has an owner, which the frame then keeps; else they are copied.
   [[nodiscard]] Frame take(const FrameView& view);
   /// A frame that could be used but found no room: its number, which no other frame gets, and its time has
   /// passed.

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "camera/metric_depth.hpp"
 #include "twofold/opencv.hpp"
 
 namespace twofold {
@@ -49,6 +50,8 @@ const char* name_of(ImageFormat format) {
       return "rgb8";
     case ImageFormat::kBgr8:
       return "bgr8";
+    case ImageFormat::kDepth32F:
+      return "depth32f";
     case ImageFormat::kDepth16:
       break;
   }
@@ -56,8 +59,22 @@ const char* name_of(ImageFormat format) {
 }
 
 int type_of(ImageFormat format) {
-  if (format == ImageFormat::kGrey8) return CV_8UC1;
-  return format == ImageFormat::kDepth16 ? CV_16UC1 : CV_8UC3;
+  switch (format) {
+    case ImageFormat::kGrey8:
+      return CV_8UC1;
+    case ImageFormat::kDepth16:
+      return CV_16UC1;
+    case ImageFormat::kDepth32F:
+      return CV_32FC1;
+    case ImageFormat::kRgb8:
+    case ImageFormat::kBgr8:
+      break;
+  }
+  return CV_8UC3;
+}
+
+bool is_depth(ImageFormat format) {
+  return format == ImageFormat::kDepth16 || format == ImageFormat::kDepth32F;
 }
 
 }  // namespace
@@ -66,14 +83,17 @@ std::string pixels_refusal(const char* name, const ImageView& view, bool depth) 
   if (view.data == nullptr) return fmt::format("the {} image is missing", name);
   if (view.width <= 0 || view.height <= 0)
     return fmt::format("the {} image is {}x{}", name, view.width, view.height);
-  if ((view.format == ImageFormat::kDepth16) != depth)
+  if (is_depth(view.format) != depth)
     return fmt::format("the {} image is {}, but must be {}", name, name_of(view.format),
-                       depth ? "depth16" : "grey8, rgb8 or bgr8");
-  const auto row = static_cast<std::ptrdiff_t>(CV_ELEM_SIZE(type_of(view.format))) * view.width;
+                       depth ? "depth16 or depth32f" : "grey8, rgb8 or bgr8");
+  const auto pixel = static_cast<std::ptrdiff_t>(CV_ELEM_SIZE(type_of(view.format)));
+  const std::ptrdiff_t row = pixel * view.width;
   if (view.stride < row)
     return fmt::format("the {} image's stride is {} bytes, but a row takes {}", name, view.stride, row);
-  if (depth && (view.stride % 2 != 0 || reinterpret_cast<std::uintptr_t>(view.data) % 2 != 0))
-    return fmt::format("the {} image's rows must begin at even addresses: a pixel takes two bytes", name);
+  if (depth && (view.stride % pixel != 0 ||
+                reinterpret_cast<std::intptr_t>(view.data) % static_cast<std::intptr_t>(pixel) != 0))
+    return fmt::format("the {} image's rows must begin at addresses divisible by {}, the bytes of a pixel",
+                       name, pixel);
   return "";
 }
 
@@ -97,6 +117,13 @@ cv::Mat pixels_of(const ImageView& view, const std::shared_ptr<const void>& owne
     theirs.copyTo(ours);
   }
   return ours;
+}
+
+cv::Mat depth_pixels_of(const ImageView& view, const std::shared_ptr<const void>& owner, double unit) {
+  if (view.data == nullptr || view.format != ImageFormat::kDepth32F) return pixels_of(view, owner);
+  const cv::Mat metres(view.height, view.width, CV_32FC1, const_cast<void*>(view.data),
+                       static_cast<std::size_t>(view.stride));
+  return in_depth_units(metres, unit);
 }
 
 cv::Mat bgr_pixels_of(const ImageView& view) {

@@ -32,9 +32,13 @@ Calibration usable_calibration(const std::filesystem::path& file, int width, int
   return calibration;
 }
 
-cv::Mat usable_image(const char* name, const FrameView& frame, const ImageView& view, bool depth) {
+void expect_pixels(const char* name, const ImageView& view, bool depth) {
   if (const std::string why = pixels_refusal(name, view, depth); !why.empty())
     throw std::invalid_argument(why);
+}
+
+cv::Mat usable_image(const char* name, const FrameView& frame, const ImageView& view) {
+  expect_pixels(name, view, false);
   return pixels_of(view, frame.owner);
 }
 
@@ -67,9 +71,12 @@ FrameView FrameRectifier::rectify(const FrameView& view) const {
   const Sensor sensor = impl_->rig.sensor;
   Frame raw;
   raw.t_ns = view.t_ns;
-  raw.left = usable_image("left", view, view.left, false);
-  if (sensor == Sensor::kRgbd) raw.depth = usable_image("depth", view, view.depth, true);
-  if (sensor == Sensor::kStereo) raw.right = usable_image("right", view, view.right, false);
+  raw.left = usable_image("left", view, view.left);
+  if (sensor == Sensor::kRgbd) {
+    expect_pixels("depth", view.depth, true);
+    raw.depth = depth_pixels_of(view.depth, view.owner, impl_->rig.depth_unit);
+  }
+  if (sensor == Sensor::kStereo) raw.right = usable_image("right", view, view.right);
   if (const std::string why = pair_refusal(view); sensor == Sensor::kStereo && !why.empty())
     throw std::invalid_argument(why);
   if (const std::string why = impl_->rectifier.mismatch_reason(raw); !why.empty())

@@ -27,6 +27,7 @@ int bytes_a_pixel(ImageFormat format) {
     case ImageFormat::kBgr8:
       return 3;
     case ImageFormat::kDepth16:
+    case ImageFormat::kDepth32F:
       break;
   }
   return 0;

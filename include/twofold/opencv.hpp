@@ -8,8 +8,8 @@
 
 namespace twofold {
 
-/// The pixels of `image` where they are: CV_8UC1, CV_8UC3 (blue, green, red) or CV_16UC1 (depth). An empty
-/// image gives an empty view. Throws std::invalid_argument for other types.
+/// The pixels of `image` where they are: CV_8UC1, CV_8UC3 (blue, green, red), CV_16UC1 (depth) or CV_32FC1
+/// (depth in metres). An empty image gives an empty view. Throws std::invalid_argument for other types.
 [[nodiscard]] inline ImageView view(const cv::Mat& image) {
   if (image.empty()) return {};
   ImageView view{image.data, image.cols, image.rows, static_cast<std::ptrdiff_t>(image.step[0])};
@@ -23,8 +23,11 @@ namespace twofold {
     case CV_16UC1:
       view.format = ImageFormat::kDepth16;
       return view;
+    case CV_32FC1:
+      view.format = ImageFormat::kDepth32F;
+      return view;
     default:
-      throw std::invalid_argument("an image must be CV_8UC1, CV_8UC3 or CV_16UC1");
+      throw std::invalid_argument("an image must be CV_8UC1, CV_8UC3, CV_16UC1 or CV_32FC1");
   }
 }
 
@@ -34,7 +37,7 @@ namespace twofold {
   auto owner = std::make_shared<const std::array<cv::Mat, 2>>(std::array<cv::Mat, 2>{left, right});
   return {t_ns, view(left), view(right), {}, std::move(owner)};
 }
-/// The same of a colour or grey image and its registered depth, CV_16UC1.
+/// The same of a colour or grey image and its registered depth, CV_16UC1 or CV_32FC1.
 [[nodiscard]] inline FrameView rgbd_frame(std::int64_t t_ns, const cv::Mat& image, const cv::Mat& depth) {
   auto owner = std::make_shared<const std::array<cv::Mat, 2>>(std::array<cv::Mat, 2>{image, depth});
   return {t_ns, view(image), {}, view(depth), std::move(owner)};

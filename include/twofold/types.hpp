@@ -72,10 +72,11 @@ struct CameraRig {
 };
 
 enum class ImageFormat : std::uint8_t {
-  kGrey8,   ///< one byte a pixel
-  kRgb8,    ///< three bytes a pixel; turned to grey
-  kBgr8,    ///< likewise, in OpenCV's order
-  kDepth16  ///< two bytes a pixel in the machine's order, 0: no reading
+  kGrey8,    ///< one byte a pixel
+  kRgb8,     ///< three bytes a pixel; turned to grey
+  kBgr8,     ///< likewise, in OpenCV's order
+  kDepth16,  ///< two bytes a pixel in the machine's order, of CameraRig::depth_unit, 0: no reading
+  kDepth32F  ///< a float a pixel [m]; what is not finite or not above 0: no reading; rounded to depth_unit
 };
 
 /// Pixels that belong to somebody else.
@@ -95,7 +96,7 @@ struct FrameView {
   std::int64_t t_ns = 0;
   ImageView left;   ///< grey or colour
   ImageView right;  ///< stereo: as left
-  ImageView depth;  ///< RGB-D: kDepth16, of the size of left and registered to it
+  ImageView depth;  ///< RGB-D: kDepth16 or kDepth32F, of the size of left and registered to it
   /// Keeps the pixels alive and unchanged: grey images and depth are then used where they are. Without it
   /// they are copied. It is let go of when the engine is done with the frame, at the latest in finish(), on
   /// any thread: one of the engine's, or one that is in a function of Slam. A deleter must not care which,

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string_view>
 
 #include "base/bytes.hpp"
+#include "camera/metric_depth.hpp"
 #include "io/files/image_file.hpp"
 #include "io/files/image_integrity.hpp"
 
@@ -143,14 +143,7 @@ cv::Mat depth_image(const ImageMessage& image, double unit) {
   cv::Mat depth = native_copy(view_of(image, encoding), image.big_endian);
   if (encoding.type == CV_16UC1) return depth;
   if (encoding.type != CV_32FC1) throw MalformedBytes("a depth image of encoding '" + image.encoding + "'");
-  cv::Mat units(depth.size(), CV_16UC1);
-  for (int y = 0; y < depth.rows; ++y) {
-    for (int x = 0; x < depth.cols; ++x) {
-      const double value = std::round(depth.at<float>(y, x) / unit);
-      units.at<std::uint16_t>(y, x) = value > 0 && value < 65536 ? static_cast<std::uint16_t>(value) : 0;
-    }
-  }
-  return units;
+  return in_depth_units(depth, unit);
 }
 
 cv::Mat depth_image(const CompressedImageMessage& image) {

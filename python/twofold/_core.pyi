@@ -206,7 +206,7 @@ class Frame:
         t_ns: int,
         left: NDArray[np.uint8],
         right: NDArray[np.uint8] | None = None,
-        depth: NDArray[np.uint16] | None = None,
+        depth: NDArray[np.uint16] | NDArray[np.float32] | None = None,
         *,
         colours: str = "bgr",
     ) -> None: ...
@@ -217,7 +217,7 @@ class Frame:
     @property
     def right(self) -> NDArray[np.uint8] | None: ...
     @property
-    def depth(self) -> NDArray[np.uint16] | None: ...
+    def depth(self) -> NDArray[np.uint16] | NDArray[np.float32] | None: ...
     @property
     def copied(self) -> tuple[str, ...]: ...
 

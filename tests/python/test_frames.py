@@ -24,6 +24,15 @@ def test_pixels_stay_where_they_are() -> None:
     assert not frame.left.flags.writeable
 
 
+def test_depth_may_be_in_metres() -> None:
+    depth = grey(48, 64).astype(np.float32) / 100
+    frame = twofold.Frame(7, grey(48, 64), depth=depth)
+    assert frame.depth is not None and frame.depth.dtype == np.float32 and np.shares_memory(frame.depth, depth)
+    rig = twofold.CameraRig(sensor=twofold.Sensor.RGBD, width=64, height=48, fx=60, fy=60, cx=32, cy=24)
+    with twofold.Slam(rig, mode=twofold.RunMode.DETERMINISTIC) as slam:
+        assert slam.push(frame)
+
+
 def test_a_cut_out_of_a_larger_image_is_not_copied() -> None:
     both = grey(48, 128)
     frame = twofold.Frame(0, both[:, :64], both[:, 64:])
@@ -47,7 +56,7 @@ def test_what_is_no_image_is_named() -> None:
         twofold.Frame(0, [[1, 2], [3, 4]])  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="right: must be uint8"):
         twofold.Frame(0, grey(4, 4), grey(4, 4).astype(np.float32))
-    with pytest.raises(ValueError, match="depth: must be uint16"):
+    with pytest.raises(ValueError, match="depth: must be uint16 or float32"):
         twofold.Frame(0, grey(4, 4), depth=grey(4, 4))  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="left: must be uint8 of shape"):
         twofold.Frame(0, np.zeros((4, 4, 4), np.uint8))

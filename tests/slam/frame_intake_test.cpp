@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
@@ -67,11 +69,36 @@ TEST_F(FrameIntakeTest, RgbdNeedsDepth) {
   FrameView frame{1, image(), {}, image(ImageFormat::kDepth16), nullptr};
   EXPECT_EQ(intake.refusal(frame), "");
   frame.depth.stride = 41;
-  expect_refused(intake, frame, "the depth image's rows must begin at even addresses");
+  expect_refused(intake, frame, "the depth image's rows must begin at addresses divisible by 2");
   frame.depth.format = ImageFormat::kGrey8;
-  expect_refused(intake, frame, "the depth image is grey8, but must be depth16");
+  expect_refused(intake, frame, "the depth image is grey8, but must be depth16 or depth32f");
   frame.depth = {};
   expect_refused(intake, frame, "the depth image is missing");
+}
+
+TEST_F(FrameIntakeTest, DepthInMetresIsRoundedToUnits) {
+  Rig rig = rig_of(SensorKind::kRgbd);
+  rig.depth_unit = 0.002;
+  FrameIntake intake(rig);
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN(),
+                  kInfinity = std::numeric_limits<float>::infinity();
+  std::vector<float> metres(std::size_t{kWidth} * kHeight, 1.0F);
+  const std::vector<float> first = {0.5F, 0.5011F, 0, -1, kNan, kInfinity, 131.07F, 131.2F};
+  std::copy(first.begin(), first.end(), metres.begin());
+  const auto owner = std::make_shared<int>(1);
+  FrameView frame{
+      1, image(), {}, {metres.data(), kWidth, kHeight, 4 * kWidth, ImageFormat::kDepth32F}, owner};
+  EXPECT_EQ(intake.refusal(frame), "");
+  const cv::Mat depth = intake.take(frame).depth;
+  ASSERT_EQ(depth.type(), CV_16UC1);
+  const std::vector<std::uint16_t> row(depth.ptr<std::uint16_t>(0), depth.ptr<std::uint16_t>(0) + kWidth);
+  EXPECT_EQ(row, (std::vector<std::uint16_t>{250, 251, 0, 0, 0, 0, 65535, 0}));
+  EXPECT_EQ(depth.at<std::uint16_t>(1, 0), 500);
+  frame.t_ns = 2;
+  frame.depth.stride = 4 * kWidth - 2;
+  expect_refused(intake, frame, "stride is 30 bytes, but a row takes 32");
+  frame.depth.stride = 4 * kWidth + 2;
+  expect_refused(intake, frame, "addresses divisible by 4");
 }
 
 TEST_F(FrameIntakeTest, TimeMustGrow) {

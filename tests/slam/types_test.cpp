@@ -38,7 +38,7 @@ TEST(PublicTypes, OpenCvImagesAreSeenWhereTheyAre) {
   EXPECT_EQ(seen.format, ImageFormat::kDepth16);
   EXPECT_EQ(view(cv::Mat(1, 1, CV_8UC3)).format, ImageFormat::kBgr8);
   EXPECT_EQ(view(cv::Mat()).data, nullptr);
-  EXPECT_THROW((void)view(cv::Mat(1, 1, CV_32FC1)), std::invalid_argument);
+  EXPECT_THROW((void)view(cv::Mat(1, 1, CV_64FC1)), std::invalid_argument);
 }
 
 }  // namespace
