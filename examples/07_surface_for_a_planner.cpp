@@ -63,7 +63,7 @@ int run(const std::string& name, const std::string& mesh) {
   // All on one thread here. A robot's surface has a thread of its own: `update` takes 10 to 100 ms for a
   // keyframe; planners ask snapshots, on theirs.
   twofold::Slam slam(source.rig(), {.mode = twofold::RunMode::kDeterministic});
-  twofold::MapSurface surface(slam.map(), {.model = {.voxel = 0.02}});
+  twofold::MapSurface surface(slam.map(), {.model = {.voxel_size = 0.02}});
   twofold::Pose T_world_camera;
   for (twofold::FrameView frame; source.next(frame);) {
     slam.push(frame);

@@ -18,7 +18,7 @@ def main(name: str = "synthetic:desk?sensor=rgbd&frames=60&width=320&height=240"
     source = twofold.Source(name)
     here = twofold.Pose()
     with twofold.Slam(source.rig, mode=twofold.RunMode.DETERMINISTIC) as slam:
-        surface = twofold.MapSurface(slam.map(), voxel=0.02)
+        surface = twofold.MapSurface(slam.map(), voxel_size=0.02)
         for frame in source:
             slam.push(frame)
             pose = slam.latest()
@@ -33,7 +33,7 @@ def main(name: str = "synthetic:desk?sensor=rgbd&frames=60&width=320&height=240"
     ahead = now.at(np.array([here @ np.array([0, 0, z]) for z in metres]))
     free = metres[ahead["state"] == twofold.SpaceState.FREE.value]
     print(f"free ahead from {free.min():.2f} to {free.max():.2f} m" if len(free) else "nothing is known ahead")
-    field = now.distances(here.t - 0.5, here.t + 0.5, cell=0.1, reach=1)
+    field = now.distances(here.t - 0.5, here.t + 0.5, resolution=0.1, max_distance=1)
     print(f"within half a metre the nearest surface is {field.distances.min():.2f} m away")
     if mesh:
         now.mesh().save(mesh)

@@ -57,9 +57,9 @@ py::array rows_of_three(const std::vector<std::array<T, 3>>& rows, const py::obj
   return view_of(reinterpret_cast<const T*>(rows.data()), {static_cast<py::ssize_t>(rows.size()), 3}, owner);
 }
 
-DistanceBox box_of(const std::array<double, 3>& lowest, const std::array<double, 3>& highest, double cell,
-                   double reach, bool unknown_is_obstacle) {
-  return {lowest, highest, cell, reach, unknown_is_obstacle};
+DistanceBox box_of(const std::array<double, 3>& min_corner, const std::array<double, 3>& max_corner,
+                   double resolution, double max_distance, bool unknown_is_obstacle) {
+  return {min_corner, max_corner, resolution, max_distance, unknown_is_obstacle};
 }
 
 void bind_mesh(py::module_& module) {
@@ -101,10 +101,10 @@ void bind_distances(py::module_& module) {
     return std::vector<py::ssize_t>{field.size[2], field.size[1], field.size[0]};
   };
   py::class_<DistanceField>(module, "DistanceField",
-                            "How far the nearest surface is, whichever way it lies, in the middle of each "
-                            "cell of a box.")
-      .def_readonly("lowest", &DistanceField::lowest, "Corner of cell [0, 0, 0] [m].")
-      .def_readonly("cell", &DistanceField::cell, "Edge of a cell [m].")
+                            "A Euclidean signed distance field (ESDF): how far the nearest surface is, "
+                            "whichever way it lies, in the middle\nof each cell of a box.")
+      .def_readonly("min_corner", &DistanceField::min_corner, "Corner of cell [0, 0, 0] [m].")
+      .def_readonly("resolution", &DistanceField::resolution, "Edge of a cell [m].")
       .def_property_readonly(
           "distances",
           [shape](const py::object& self) {
@@ -133,8 +133,9 @@ constexpr const char* kAtDoc =
     "What is known of positions: (N, 3) [m] -> (N,) with fields state (number of a SpaceState), distance (to "
     "the surface\n[m], positive outside; ends at four voxels) and gradient (3,).";
 constexpr const char* kDistancesDoc =
-    "Of each cell of a box, as far as reach, how far the nearest surface is, whichever way it lies: a "
-    "DistanceField.\nCorners are (3,) [m], cell and reach in metres. Raises ValueError for more than 2^26 "
+    "Of each cell of a box, as far as max_distance, how far the nearest surface is, whichever way it lies: a "
+    "DistanceField.\nCorners are (3,) [m], resolution and max_distance in metres. Raises ValueError for more "
+    "than 2^26 "
     "cells.";
 
 /// Questions that both kinds of surfaces answer.
@@ -151,15 +152,16 @@ void bind_questions(Class& surface, const Questions& questions) {
           py::arg("positions"), kAtDoc)
       .def(
           "distances",
-          [questions](const typename Class::type& self, const std::array<double, 3>& lowest,
-                      const std::array<double, 3>& highest, double cell, double reach, bool unknown) {
+          [questions](const typename Class::type& self, const std::array<double, 3>& min_corner,
+                      const std::array<double, 3>& max_corner, double resolution, double max_distance,
+                      bool unknown) {
             const py::gil_scoped_release unlocked;
             return questions(self, [&](const auto& asked) {
-              return asked.distances(box_of(lowest, highest, cell, reach, unknown));
+              return asked.distances(box_of(min_corner, max_corner, resolution, max_distance, unknown));
             });
           },
-          py::arg("lowest"), py::arg("highest"), py::kw_only(), py::arg("cell") = 0.1, py::arg("reach") = 1.0,
-          py::arg("unknown_is_obstacle") = false, kDistancesDoc)
+          py::arg("min_corner"), py::arg("max_corner"), py::kw_only(), py::arg("resolution") = 0.1,
+          py::arg("max_distance") = 1.0, py::arg("unknown_is_obstacle") = false, kDistancesDoc)
       .def(
           "mesh",
           [questions](const typename Class::type& self) {
@@ -176,24 +178,26 @@ void bind_questions(Class& surface, const Questions& questions) {
           "Of all that is kept.");
 }
 
-SurfaceModelOptions model_options(double voxel, double max_depth, double max_free_depth,
-                                  double nearest_stereo) {
-  return {voxel, max_depth, max_free_depth, nearest_stereo};
+SurfaceModelOptions model_options(double voxel_size, double max_depth, double max_free_depth,
+                                  double min_stereo_depth) {
+  return {voxel_size, max_depth, max_free_depth, min_stereo_depth};
 }
 
 void bind_model(py::module_& module) {
   py::class_<Model> model(module, "SurfaceModel",
-                          "A dense surface from frames with poses, for planners and models.\n\n"
+                          "A dense surface from frames with poses, for planners and models: a truncated "
+                          "signed distance field (TSDF volume).\n\n"
                           "Where poses are corrected afterwards, MapSurface moves with the map.");
   model
-      .def(py::init([](const CameraRig& rig, double voxel, double max_depth, double max_free_depth,
-                       double nearest_stereo) {
-             return std::make_unique<Model>(rig,
-                                            model_options(voxel, max_depth, max_free_depth, nearest_stereo));
+      .def(py::init([](const CameraRig& rig, double voxel_size, double max_depth, double max_free_depth,
+                       double min_stereo_depth) {
+             return std::make_unique<Model>(
+                 rig, model_options(voxel_size, max_depth, max_free_depth, min_stereo_depth));
            }),
-           py::arg("rig"), py::kw_only(), py::arg("voxel") = 0.05, py::arg("max_depth") = 0.0,
-           py::arg("max_free_depth") = 0.0, py::arg("nearest_stereo") = 0.4,
-           "voxel: distance of two samples [m]. Readings farther than max_depth begin no surface, and free "
+           py::arg("rig"), py::kw_only(), py::arg("voxel_size") = 0.05, py::arg("max_depth") = 0.0,
+           py::arg("max_free_depth") = 0.0, py::arg("min_stereo_depth") = 0.4,
+           "voxel_size: distance of two samples [m]. Readings farther than max_depth begin no surface, and "
+           "free "
            "space is kept as far\nas max_free_depth from the camera [m]; 0: as far as there are readings. "
            "Raises ValueError for a rig without depth.")
       .def(
@@ -235,15 +239,15 @@ void bind_map_surface(py::module_& module) {
   py::class_<OfMap>(module, "MapSurface",
                     "The surface of a run's keyframes, which moves with its map: as `twofold run --surface` "
                     "makes it.")
-      .def(py::init([](const MapRows& map, double voxel, double max_depth, double max_free_depth,
-                       double nearest_stereo, double memory_mb) {
+      .def(py::init([](const MapRows& map, double voxel_size, double max_depth, double max_free_depth,
+                       double min_stereo_depth, double memory_mb) {
              return std::make_unique<OfMap>(
                  map.snapshot,
-                 MapSurfaceOptions{model_options(voxel, max_depth, max_free_depth, nearest_stereo),
+                 MapSurfaceOptions{model_options(voxel_size, max_depth, max_free_depth, min_stereo_depth),
                                    memory_mb});
            }),
-           py::arg("map"), py::kw_only(), py::arg("voxel") = 0.05, py::arg("max_depth") = 0.0,
-           py::arg("max_free_depth") = 0.0, py::arg("nearest_stereo") = 0.4, py::arg("memory_mb") = 2000.0,
+           py::arg("map"), py::kw_only(), py::arg("voxel_size") = 0.05, py::arg("max_depth") = 0.0,
+           py::arg("max_free_depth") = 0.0, py::arg("min_stereo_depth") = 0.4, py::arg("memory_mb") = 2000.0,
            "map: of the run, before its first keyframe; it tells the rig. Beyond memory_mb [MiB] no keyframe "
            "is added. The\nothers: as SurfaceModel.")
       .def(

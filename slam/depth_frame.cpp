@@ -20,14 +20,14 @@ cv::Mat colour_of(const ImageView& view) {
   return is_grey ? pixels_of(view, nullptr) : bgr_pixels_of(view);
 }
 
-cv::Mat depth_of_pair(const Rig& rig, const FrameView& frame, double nearest_stereo) {
+cv::Mat depth_of_pair(const Rig& rig, const FrameView& frame, double min_stereo_depth) {
   expect_pixels("right", frame.right, false);
   const cv::Mat left = pixels_of(frame.left, nullptr);
   const cv::Mat right = pixels_of(frame.right, nullptr);
   const cv::Size size(rig.camera.width, rig.camera.height);
   if (left.size() != size || right.size() != size)
     throw std::invalid_argument("left and right image must both be of the rig's size");
-  return stereo_depth(rig, left, right, nearest_stereo);
+  return stereo_depth(rig, left, right, min_stereo_depth);
 }
 
 }  // namespace
@@ -42,17 +42,17 @@ SurfaceOptions surface_options(const Rig& rig, const SurfaceModelOptions& option
   if (const std::string why = options.invalid_reason(); !why.empty())
     throw std::invalid_argument("options." + why);
   SurfaceOptions surface;
-  surface.voxel = options.voxel;
+  surface.voxel = options.voxel_size;
   surface.max_depth = options.max_depth;
   surface.depth_noise = usual_depth_noise(rig);
   return surface;
 }
 
-DepthFrame depth_frame(const Rig& rig, const FrameView& frame, double nearest_stereo) {
+DepthFrame depth_frame(const Rig& rig, const FrameView& frame, double min_stereo_depth) {
   expect_pixels("left", frame.left, false);
   DepthFrame images;
   if (rig.kind == SensorKind::kStereo) {
-    images.depth = depth_of_pair(rig, frame, nearest_stereo);
+    images.depth = depth_of_pair(rig, frame, min_stereo_depth);
   } else {
     expect_pixels("depth", frame.depth, true);
     images.depth = depth_pixels_of(frame.depth, frame.owner, rig.depth_unit);

@@ -16,7 +16,7 @@ struct DepthFrame {
 
 /// Of a depth image, or of a pair by semi-global matching. Throws std::invalid_argument saying what is wrong
 /// with the images.
-[[nodiscard]] DepthFrame depth_frame(const Rig& rig, const FrameView& frame, double nearest_stereo);
+[[nodiscard]] DepthFrame depth_frame(const Rig& rig, const FrameView& frame, double min_stereo_depth);
 
 /// Throws std::invalid_argument for a rig without depth.
 [[nodiscard]] Rig expect_depth(const Rig& rig);

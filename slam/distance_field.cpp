@@ -21,14 +21,17 @@ Eigen::Vector3d vector_of(const std::array<double, 3>& x) {
 /// Cells of a box, and of what is within reach of it.
 struct Grid {
   explicit Grid(const DistanceBox& box)
-      : size(((vector_of(box.highest) - vector_of(box.lowest)) / box.cell).array().ceil().cast<int>()),
-        border(static_cast<int>(std::ceil(box.reach / box.cell)) + 1),
-        origin(vector_of(box.lowest).array() - border * box.cell) {}
+      : size(((vector_of(box.max_corner) - vector_of(box.min_corner)) / box.resolution)
+                 .array()
+                 .ceil()
+                 .cast<int>()),
+        border(static_cast<int>(std::ceil(box.max_distance / box.resolution)) + 1),
+        origin(vector_of(box.min_corner).array() - border * box.resolution) {}
 
   [[nodiscard]] Eigen::Vector3i whole() const { return size.array() + 2 * border; }
   /// Of a cell of the whole grid [m].
-  [[nodiscard]] std::array<double, 3> middle(const Eigen::Vector3i& at, double cell) const {
-    const Eigen::Vector3d x = origin + cell * (at.cast<double>().array() + 0.5).matrix();
+  [[nodiscard]] std::array<double, 3> middle(const Eigen::Vector3i& at, double resolution) const {
+    const Eigen::Vector3d x = origin + resolution * (at.cast<double>().array() + 0.5).matrix();
     return {x.x(), x.y(), x.z()};
   }
 
@@ -46,10 +49,11 @@ void for_each_cell(const Eigen::Vector3i& size, Visit&& visit) {
 }
 
 /// Of the surface, so close that no cell that it passes through is without [cells of the whole grid].
-std::vector<Eigen::Vector3f> surface_points(const SurfaceVolume& volume, const Grid& grid, double cell) {
+std::vector<Eigen::Vector3f> surface_points(const SurfaceVolume& volume, const Grid& grid,
+                                            double resolution) {
   TriangleMesh mesh = extract_mesh(volume);
   const Eigen::Vector3f origin = grid.origin.cast<float>();
-  for (Eigen::Vector3f& x : mesh.positions) x = (x - origin) / static_cast<float>(cell);
+  for (Eigen::Vector3f& x : mesh.positions) x = (x - origin) / static_cast<float>(resolution);
   const Eigen::Array3f most = grid.whole().cast<float>();
   const auto is_outside = [&](const std::array<std::uint32_t, 3>& corners) {
     const Eigen::Array3f a = mesh.positions[corners[0]], b = mesh.positions[corners[1]],
@@ -72,16 +76,19 @@ std::vector<Eigen::Vector3f> surface_points(const SurfaceVolume& volume, const G
 
 std::string DistanceBox::invalid_reason() const {
   OptionCheck check;
-  check.above("cell", cell, 0).within("reach", reach, 0, kFarthestCorner).above("reach", reach, 0);
+  check.above("resolution", resolution, 0)
+      .within("max_distance", max_distance, 0, kFarthestCorner)
+      .above("max_distance", max_distance, 0);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    check.within("lowest", lowest[axis], -kFarthestCorner, kFarthestCorner)
-        .within("highest", highest[axis], -kFarthestCorner, kFarthestCorner);
-    check.above("highest - lowest", highest[axis] - lowest[axis], 0);
+    check.within("min_corner", min_corner[axis], -kFarthestCorner, kFarthestCorner)
+        .within("max_corner", max_corner[axis], -kFarthestCorner, kFarthestCorner);
+    check.above("max_corner - min_corner", max_corner[axis] - min_corner[axis], 0);
   }
   if (std::string reason = check.reason(); !reason.empty()) return reason;
-  const Eigen::Array3d edges = (vector_of(highest) - vector_of(lowest)).array() + 2 * reach;
+  const Eigen::Array3d edges = (vector_of(max_corner) - vector_of(min_corner)).array() + 2 * max_distance;
   return OptionCheck()
-      .within("cells of the box and what is within reach", (edges / cell + 4).prod(), 1, kMostCells)
+      .within("cells of the box and what is within max_distance", (edges / resolution + 4).prod(), 1,
+              kMostCells)
       .reason();
 }
 
@@ -103,10 +110,10 @@ SpacePoint space_point(const SurfaceVolume& volume, const FreeSpace& free,
 
 DistanceField distance_field(const SurfaceVolume& volume, const FreeSpace& free, const DistanceBox& box) {
   const Grid grid(box);
-  std::vector<Eigen::Vector3f> points = surface_points(volume, grid, box.cell);
-  DistanceField field{box.lowest, box.cell, {grid.size.x(), grid.size.y(), grid.size.z()}, {}, {}};
+  std::vector<Eigen::Vector3f> points = surface_points(volume, grid, box.resolution);
+  DistanceField field{box.min_corner, box.resolution, {grid.size.x(), grid.size.y(), grid.size.z()}, {}, {}};
   const auto state_of = [&](const Eigen::Vector3i& at) {
-    return space_point(volume, free, grid.middle(at, box.cell)).state;
+    return space_point(volume, free, grid.middle(at, box.resolution)).state;
   };
   const Eigen::Vector3i border = Eigen::Vector3i::Constant(grid.border);
   for_each_cell(grid.size, [&](const Eigen::Vector3i& at) { field.states.push_back(state_of(at + border)); });
@@ -119,7 +126,7 @@ DistanceField distance_field(const SurfaceVolume& volume, const FreeSpace& free,
   field.distances.reserve(field.states.size());
   for_each_cell(grid.size, [&](const Eigen::Vector3i& at) {
     const auto metres = static_cast<float>(
-        std::min(static_cast<double>(nearest.distance(at + border)) * box.cell, box.reach));
+        std::min(static_cast<double>(nearest.distance(at + border)) * box.resolution, box.max_distance));
     const bool inside = field.states[field.distances.size()] == SpaceState::kOccupied;
     field.distances.push_back(inside ? -metres : metres);
   });
@@ -127,7 +134,7 @@ DistanceField distance_field(const SurfaceVolume& volume, const FreeSpace& free,
 }
 
 SpacePoint DistanceField::at(const std::array<double, 3>& p_world) const {
-  const Eigen::Array3d in_cells = (vector_of(p_world) - vector_of(lowest)).array() / cell;
+  const Eigen::Array3d in_cells = (vector_of(p_world) - vector_of(min_corner)).array() / resolution;
   const Eigen::Array3d most(size[0], size[1], size[2]);
   if (!(in_cells >= 0).all() || !(in_cells < most).all()) return {};
   const auto number = [&](const Eigen::Array3i& at) {
@@ -151,7 +158,7 @@ SpacePoint DistanceField::at(const std::array<double, 3>& p_world) const {
     point.distance += value * weight.prod();
     for (int axis = 0; axis < 3; ++axis) {
       const double others = weight[(axis + 1) % 3] * weight[(axis + 2) % 3];
-      point.gradient[static_cast<std::size_t>(axis)] += value * slope[axis] * others / cell;
+      point.gradient[static_cast<std::size_t>(axis)] += value * slope[axis] * others / resolution;
     }
   }
   return point;

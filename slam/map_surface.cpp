@@ -101,12 +101,12 @@ std::size_t SurfaceSnapshot::memory_bytes() const {
 struct MapSurface::Impl {
   Impl(const Rig& its_rig, const SurfaceModelOptions& its_options, const SubmapOptions& limits)
       : rig(its_rig),
-        nearest_stereo(its_options.nearest_stereo),
+        min_stereo_depth(its_options.min_stereo_depth),
         options(surface_options(rig, its_options)),
         submaps(rig, options, limits) {}
 
   Rig rig;
-  double nearest_stereo;
+  double min_stereo_depth;
   SurfaceOptions options;
   SubmapSurface submaps;
   std::int64_t newest_frame = -1;
@@ -140,7 +140,7 @@ void MapSurface::add(const FrameView& frame, std::int64_t number) {
   if (number <= impl_->newest_frame)
     throw std::invalid_argument("number " + std::to_string(number) + " comes after " +
                                 std::to_string(impl_->newest_frame));
-  const DepthFrame images = depth_frame(impl_->rig, frame, impl_->nearest_stereo);
+  const DepthFrame images = depth_frame(impl_->rig, frame, impl_->min_stereo_depth);
   impl_->submaps.offer(pack_keyframe_depth(number, images.depth, images.colour));
   impl_->newest_frame = number;
 }

@@ -22,10 +22,10 @@ constexpr double kUnitLength = 1e-3;  // that a quaternion's squared length may 
 
 std::string SurfaceModelOptions::invalid_reason() const {
   return OptionCheck()
-      .within("voxel", voxel, 1e-4, 10)
+      .within("voxel_size", voxel_size, 1e-4, 10)
       .at_least("max_depth", max_depth, 0)
       .at_least("max_free_depth", max_free_depth, 0)
-      .above("nearest_stereo", nearest_stereo, 0)
+      .above("min_stereo_depth", min_stereo_depth, 0)
       .reason();
 }
 
@@ -57,7 +57,7 @@ int SurfaceModel::add(const FrameView& frame, const Pose& T_world_camera) {
   const SE3 T_w_c = to_se3(T_world_camera);
   if (!(T_w_c.translation().norm() < kFarthest) || !T_w_c.matrix().allFinite())
     throw std::invalid_argument("T_world_camera is not finite, or farther than 100 km from the origin");
-  const DepthFrame images = depth_frame(rig, frame, impl_->options.nearest_stereo);
+  const DepthFrame images = depth_frame(rig, frame, impl_->options.min_stereo_depth);
   const DepthView view = make_depth_view(rig, images.depth, images.colour);
   const int readings = cv::countNonZero(view.depth);
   if (readings == 0) return 0;
@@ -86,7 +86,8 @@ SurfaceMesh SurfaceModel::mesh() const {
 
 SurfaceChanges SurfaceModel::mesh_changes(std::uint64_t since) {
   impl_->pieces.update(impl_->volume);
-  return {impl_->pieces.revision(), kBlockEdge * impl_->options.voxel, surface_pieces(impl_->pieces, since)};
+  return {impl_->pieces.revision(), kBlockEdge * impl_->options.voxel_size,
+          surface_pieces(impl_->pieces, since)};
 }
 
 std::size_t SurfaceModel::memory_bytes() const {

@@ -473,8 +473,8 @@ void Viewer::show(std::int64_t frame, const ImageView& left, std::shared_ptr<con
   impl_->put(new HeldImage(owner ? HeldImage{frame, left, std::move(owner)} : own_copy(frame, left)));
 }
 
-void Viewer::show_surface(std::uint32_t part, double edge, std::vector<SurfacePiece> pieces) {
-  impl_->put_surface({part, edge, std::move(pieces)});
+void Viewer::show_surface(std::uint32_t part, double cell_size, std::vector<SurfacePiece> pieces) {
+  impl_->put_surface({part, cell_size, std::move(pieces)});
 }
 
 void Viewer::finish() {

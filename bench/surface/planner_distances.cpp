@@ -21,12 +21,12 @@
 namespace twofold {
 namespace {
 
-constexpr float kSpacing = 0.06F;  // [m] of the surface's points that are asked before
-constexpr double kReach = 0.6;     // [m]
+constexpr float kSpacing = 0.06F;     // [m] of the surface's points that are asked before
+constexpr double kMaxDistance = 0.6;  // [m]
 
 SurfaceModel model_of(const std::string& name, double voxel, int every) {
   Source source(name);
-  SurfaceModel model(source.rig(), {.voxel = voxel});
+  SurfaceModel model(source.rig(), {.voxel_size = voxel});
   std::size_t n = 0;
   for (FrameView frame; source.next(frame); ++n) {
     if (n % static_cast<std::size_t>(every) == 0)
@@ -58,23 +58,23 @@ class Errors {
 };
 
 DistanceField field_before(const SurfaceModel& model, const TriangleMesh& seen, double voxel) {
-  DistanceBox box{.cell = 2 * voxel, .reach = kReach};
+  DistanceBox box{.resolution = 2 * voxel, .max_distance = kMaxDistance};
   for (int axis = 0; axis < 3; ++axis) {
     const auto [least, most] =
         std::minmax_element(seen.positions.begin(), seen.positions.end(),
                             [&](const auto& a, const auto& b) { return a[axis] < b[axis]; });
-    box.lowest[static_cast<std::size_t>(axis)] = (*least)[axis] - 0.1;
-    box.highest[static_cast<std::size_t>(axis)] = (*most)[axis] + 0.1;
+    box.min_corner[static_cast<std::size_t>(axis)] = (*least)[axis] - 0.1;
+    box.max_corner[static_cast<std::size_t>(axis)] = (*most)[axis] + 0.1;
   }
   const std::int64_t begin_ns = thread_cpu_ns();
   DistanceField field = model.distances(box);
-  std::printf("%zu cells of %.3f m in %.2f CPU-s\n", field.distances.size(), field.cell,
+  std::printf("%zu cells of %.3f m in %.2f CPU-s\n", field.distances.size(), field.resolution,
               1e-9 * static_cast<double>(thread_cpu_ns() - begin_ns));
   return field;
 }
 
 void compare(const SurfaceModel& model, const TriangleMesh& seen, double voxel) {
-  const TriangleGrid truth(seen, static_cast<float>(kReach));
+  const TriangleGrid truth(seen, static_cast<float>(kMaxDistance));
   const DistanceField field = field_before(model, seen, voxel);
   std::printf(
       "| before the surface | points | at: median / p95 off, too large by half a voxel, gradient within 20 "
@@ -92,7 +92,7 @@ void compare(const SurfaceModel& model, const TriangleMesh& seen, double voxel) 
       const SpacePoint said = model.at(p);
       if (said.state != SpaceState::kFree) continue;
       const double distance = truth.distance(x);
-      if (distance >= kReach) continue;
+      if (distance >= kMaxDistance) continue;
       constexpr float kStep = 1e-3F;  // [m]
       Eigen::Vector3d away;
       for (int axis = 0; axis < 3; ++axis) {

@@ -13,14 +13,14 @@
 namespace twofold {
 
 struct SurfaceModelOptions {
-  double voxel = 0.05;  ///< distance of two samples [m], 1e-4 .. 10
+  double voxel_size = 0.05;  ///< distance of two samples [m], 1e-4 .. 10
   double max_depth =
       0;  ///< readings farther than this begin no surface [m] >= 0; 0: CameraRig's bounds alone
   /// Free space away from surfaces is kept as far as this from the camera [m] >= 0; 0: as far as there are
   /// readings.
   double max_free_depth = 0;
-  double nearest_stereo = 0.4;  ///< stereo: the nearest depth that is looked for [m] > 0; the nearer, the
-                                ///< longer `add` takes
+  double min_stereo_depth = 0.4;  ///< stereo: the nearest depth that is looked for [m] > 0; the nearer, the
+                                  ///< longer `add` takes
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] TWOFOLD_API std::string invalid_reason() const;
@@ -48,25 +48,25 @@ struct SpacePoint {
 
 /// A box of space, and how finely it is asked about.
 struct DistanceBox {
-  std::array<double, 3> lowest{0, 0, 0};   ///< its lowest corner [m]
-  std::array<double, 3> highest{0, 0, 0};  ///< the corner opposite [m], above the lowest in each axis
-  double cell = 0.1;                       ///< edge of a cell [m] > 0
-  double reach = 1;                        ///< no distance is longer [m] > 0
-  bool unknown_is_obstacle = false;        ///< middles of unknown cells are taken for points of a surface
+  std::array<double, 3> min_corner{0, 0, 0};  ///< [m]
+  std::array<double, 3> max_corner{0, 0, 0};  ///< [m], above min_corner in each axis
+  double resolution = 0.1;                    ///< edge of a cell [m] > 0
+  double max_distance = 1;                    ///< no distance is longer [m] > 0
+  bool unknown_is_obstacle = false;           ///< middles of unknown cells are taken for points of a surface
 
-  /// Empty when valid; otherwise names the field, the rule and the value. The box and what is within reach
-  /// of it have 2^26 cells at most, which take 0.5 GB while distances are found,
+  /// Empty when valid; otherwise names the field, the rule and the value. The box and what is within
+  /// max_distance of it have 2^26 cells at most, which take 0.5 GB while distances are found,
   /// and up to 0.8 GB more where many are unknown and taken for obstacles.
   [[nodiscard]] TWOFOLD_API std::string invalid_reason() const;
 };
 
-/// How far the nearest surface is, whichever way it lies, in the middle of each cell of a box: a Euclidean
-/// signed distance field, as planners and trajectory optimisers take it.
+/// A Euclidean signed distance field (ESDF), as planners and trajectory optimisers take it: how far the
+/// nearest surface is, whichever way it lies, in the middle of each cell of a box.
 struct DistanceField {
-  std::array<double, 3> lowest{0, 0, 0};  ///< corner of cell (0, 0, 0) [m]
-  double cell = 0;                        ///< [m]
-  std::array<std::int32_t, 3> size{};     ///< cells along x, y, z
-  /// [m], negative inside a surface, the reach at most; of unknown cells, to the nearest surface that is
+  std::array<double, 3> min_corner{0, 0, 0};  ///< of cell (0, 0, 0) [m]
+  double resolution = 0;                      ///< edge of a cell [m]
+  std::array<std::int32_t, 3> size{};         ///< cells along x, y, z
+  /// [m], negative inside a surface, max_distance at most; of unknown cells, to the nearest surface that is
   /// known. Cell (i, j, k) is at i + size[0] * (j + size[1] * k), as in `states`.
   std::vector<float> distances;
   std::vector<SpaceState> states;
@@ -94,21 +94,21 @@ TWOFOLD_API void save_mesh(const SurfaceMesh& mesh, const std::filesystem::path&
 
 /// The part of a mesh that lies in one cell of a grid.
 struct SurfacePiece {
-  std::array<std::int32_t, 3> cell{};  ///< its lowest corner, in edges of a cell
+  std::array<std::int32_t, 3> cell{};  ///< its lowest corner, in cells
   SurfaceMesh mesh;                    ///< vertices on the border are in several pieces; empty: nothing there
 };
 
 /// What changed in a mesh since a revision.
 struct SurfaceChanges {
   std::uint64_t revision = 0;        ///< that it leads to
-  double edge = 0;                   ///< of a cell [m]
+  double cell_size = 0;              ///< edge of a cell [m]
   std::vector<SurfacePiece> pieces;  ///< these replace what was there
 };
 
 /// A dense surface from frames with poses, for planners and models: where is free space, how far is the next
-/// obstacle, and what does it look like.
+/// obstacle, and what does it look like. A truncated signed distance field (TSDF volume) in sparse blocks.
 ///
-///   SurfaceModel model(rig, {.voxel = 0.05});
+///   SurfaceModel model(rig, {.voxel_size = 0.05});
 ///   if (estimate.keyframe && estimate.map_part == part) model.add(frame, estimate.T_world_camera);
 ///   if (model.at({x, y, z}).state == SpaceState::kFree) ...
 ///
@@ -116,12 +116,12 @@ struct SurfaceChanges {
 /// edge, of which one frame must have seen through all: with no hole in the depth over it, and no surface
 /// within the truncation behind it. A thing thinner than a cell therefore keeps the cell unknown around it.
 ///
-/// What moves away is carved away by later frames. What comes to stand in free space makes unknown what it
-/// hides, since that may be its inside. A model stays where its poses put it: after a loop
-/// closure, clear it and add the frames of keyframes anew, which the caller keeps (PoseEstimate::keyframe).
-/// One model holds one map part: poses of another have another world. Same calls, same answers. Threads: at,
-/// distances and mesh by several at once, add, clear and mesh_changes by one while nobody else does anything.
-/// A model that was moved from may only be assigned to or destroyed.
+/// What moves away is carved away by later frames. When an obstacle appears in free space, the cells behind
+/// it become unknown. A model stays where its poses put it: after a loop closure, clear it and add the frames
+/// of keyframes anew, which the caller keeps (PoseEstimate::keyframe). One model holds one map part: poses of
+/// another have another world. Same calls, same answers. Threads: at, distances and mesh by several at once,
+/// add, clear and mesh_changes by one while nobody else does anything. A model that was moved from may only
+/// be assigned to or destroyed.
 class TWOFOLD_API SurfaceModel {
  public:
   /// Throws std::invalid_argument naming the field of rig or options, the rule and the value; one camera has
@@ -145,7 +145,7 @@ class TWOFOLD_API SurfaceModel {
 
   /// p_world [m]. What is not finite is unknown.
   [[nodiscard]] SpacePoint at(const std::array<double, 3>& p_world) const;
-  /// To the nearest surface of `mesh` whichever way it lies, in a box of space, right to a fraction of a
+  /// The ESDF of a box: to the nearest surface of `mesh` whichever way it lies, right to a fraction of a
   /// cell: at most half of its edge at the surface itself, where `at` is finer, less farther away. Takes
   /// about a second for a million cells, and as long as `mesh`. Throws std::invalid_argument with
   /// DistanceBox::invalid_reason, std::bad_alloc when memory ends.
@@ -206,7 +206,7 @@ class TWOFOLD_API SurfaceSnapshot {
 
 /// The surface of a run's keyframes, which moves with the map: as `twofold run --surface` makes it.
 ///
-///   MapSurface surface(slam.map(), {.model = {.voxel = 0.02}});
+///   MapSurface surface(slam.map(), {.model = {.voxel_size = 0.02}});
 ///   ... for keyframes, in a thread of yours:
 ///   surface.add(frame, estimate.frame);
 ///   surface.update(slam.map());
@@ -214,8 +214,8 @@ class TWOFOLD_API SurfaceSnapshot {
 ///
 /// Keyframes are fused into submaps that hang on the map: a loop moves them, and those inside which poses
 /// have moved by more than half a voxel are fused anew. Depth images are kept for that, compressed, as long
-/// as their keyframes are in the map. add, update and snapshot by one thread at a time; nobody waits for who
-/// holds a snapshot, of which a submap is copied before it changes.
+/// as their keyframes are in the map. add, update and snapshot by one thread at a time. Holding a snapshot
+/// blocks nobody: `update` copies a shared submap before changing it, which costs memory.
 class TWOFOLD_API MapSurface {
  public:
   /// @param map  of the run, before its first keyframe: it tells the rig, and what comes of a loaded map
@@ -225,9 +225,10 @@ class TWOFOLD_API MapSurface {
   MapSurface(MapSurface&&) noexcept;
   MapSurface& operator=(MapSurface&&) noexcept;
 
-  /// The depth of a rectified frame that the tracker took for a keyframe (PoseEstimate::keyframe), before or
-  /// after the map has it; others are let go of once the map has a later one, and the oldest of more than 64
-  /// that wait. Packs it, and takes as long as SurfaceModel::add for a pair.
+  /// The depth of a rectified frame that the tracker proposed as a keyframe (PoseEstimate::keyframe), before
+  /// or after the map has it. If the mapper rejects the proposal, the frame is discarded once `update` sees a
+  /// later keyframe. At most 64 wait; then the oldest is discarded. A stereo pair takes about 100 ms, because
+  /// its depth is computed here; a depth image is only compressed.
   /// @param number  PoseEstimate::frame; it grows
   /// Throws std::invalid_argument saying what is wrong with the images.
   void add(const FrameView& frame, std::int64_t number);

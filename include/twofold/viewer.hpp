@@ -140,10 +140,10 @@ class TWOFOLD_API Viewer {
   ///               on this thread or the viewer's; null: they are copied
   void show(std::int64_t frame, const ImageView& left, std::shared_ptr<const void> owner);
 
-  /// Pieces of a mesh, in the world of a map part; a mesh of another part, or of cells of another edge,
+  /// Pieces of a mesh, in the world of a map part; a mesh of another part, or of cells of another size,
   /// replaces what was shown. At most about 256 MB of it are; a piece of more than 65,535 vertices is not.
-  /// @param edge  of a cell, in the map's unit
-  void show_surface(std::uint32_t part, double edge, std::vector<SurfacePiece> pieces);
+  /// @param cell_size  edge of a cell, in the map's unit
+  void show_surface(std::uint32_t part, double cell_size, std::vector<SurfacePiece> pieces);
 
   /// The run is over, its last map there: viewers get it, and are told. Waits for slow ones at most three
   /// seconds beyond what a callback takes. A second call does nothing. Throws std::logic_error when one of

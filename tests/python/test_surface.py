@@ -24,7 +24,7 @@ def rig() -> twofold.CameraRig:
 
 
 def test_a_model_tells_what_is_free_and_how_far_the_wall_is(rig: twofold.CameraRig, tmp_path: Path) -> None:
-    model = twofold.SurfaceModel(rig, voxel=0.02)
+    model = twofold.SurfaceModel(rig, voxel_size=0.02)
     assert model.add(wall(rig, 2.0), twofold.Pose()) == rig.width * rig.height
     known = model.at(np.array([[0, 0, 1.0], [0, 0, 1.96], [0, 0, 2.03], [0, 0, 5]]))
     assert [twofold.SpaceState(int(state)) for state in known["state"]] == [
@@ -37,7 +37,7 @@ def test_a_model_tells_what_is_free_and_how_far_the_wall_is(rig: twofold.CameraR
     assert known["gradient"].shape == (4, 3)
     assert known["gradient"][1][2] == pytest.approx(-1, abs=0.1)
 
-    field = model.distances([-0.1, -0.2, 1.0], [0.1, 0.2, 1.9], cell=0.1, reach=1)
+    field = model.distances([-0.1, -0.2, 1.0], [0.1, 0.2, 1.9], resolution=0.1, max_distance=1)
     assert field.distances.shape == field.states.shape == (9, 4, 2)
     assert field.distances[0, 0, 0] == pytest.approx(0.95, abs=0.03)
     assert field.at(np.array([[0.0, 0, 1.55]]))["distance"][0] == pytest.approx(0.45, abs=0.03)
@@ -54,7 +54,7 @@ def test_a_model_tells_what_is_free_and_how_far_the_wall_is(rig: twofold.CameraR
 
 
 def test_meshes_are_saved_by_the_kind_of_their_name(rig: twofold.CameraRig, tmp_path: Path) -> None:
-    model = twofold.SurfaceModel(rig, voxel=0.05)
+    model = twofold.SurfaceModel(rig, voxel_size=0.05)
     model.add(wall(rig, 1.5), twofold.Pose())
     mesh = model.mesh()
     for name in ("wall.ply", "wall.glb", "wall.obj"):
@@ -68,14 +68,14 @@ def test_meshes_are_saved_by_the_kind_of_their_name(rig: twofold.CameraRig, tmp_
 
 
 def test_what_makes_no_sense_is_refused(rig: twofold.CameraRig) -> None:
-    with pytest.raises(ValueError, match="voxel"):
-        twofold.SurfaceModel(rig, voxel=0)
+    with pytest.raises(ValueError, match="voxel_size"):
+        twofold.SurfaceModel(rig, voxel_size=0)
     model = twofold.SurfaceModel(rig)
     with pytest.raises(ValueError, match="depth"):
         model.add(twofold.Frame(0, np.zeros((rig.height, rig.width), np.uint8)), twofold.Pose())
     with pytest.raises(ValueError, match=r"\(N, 3\)"):
         model.at([0.0, 0, 1])
-    with pytest.raises(ValueError, match="highest"):
+    with pytest.raises(ValueError, match="max_corner"):
         model.distances([0, 0, 0], [0, 0, 0])
     assert model.memory_bytes() == 0
     model.add(wall(rig, 1.5), twofold.Pose())
@@ -87,7 +87,7 @@ def test_what_makes_no_sense_is_refused(rig: twofold.CameraRig) -> None:
 def test_a_runs_surface_follows_its_map() -> None:
     source = twofold.Source(SCENE)
     with twofold.Slam(source.rig, mode=twofold.RunMode.DETERMINISTIC) as slam:
-        surface = twofold.MapSurface(slam.map(), voxel=0.04)
+        surface = twofold.MapSurface(slam.map(), voxel_size=0.04)
         early = surface.snapshot()
         assert early.map_part is None
         for frame in source:

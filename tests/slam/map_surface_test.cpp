@@ -39,7 +39,7 @@ class MapSurfaceTest : public ::testing::Test {
 
   Source source_{kScene};
   Slam slam_{source_.rig(), {.mode = RunMode::kDeterministic}};
-  MapSurface surface_{slam_.map(), {.model = {.voxel = kVoxel}}};
+  MapSurface surface_{slam_.map(), {.model = {.voxel_size = kVoxel}}};
   std::optional<PoseEstimate> pose_;
 };
 
@@ -116,8 +116,9 @@ TEST_F(MapSurfaceTest, SaysWhatIsWrong) {
   ASSERT_TRUE(source_.next(frame));
   EXPECT_THROW(surface_.add(frame, 0), std::invalid_argument) << "a number that does not grow";
   EXPECT_THROW(MapSurface(slam_.map(), {.memory_mb = 0}), std::invalid_argument);
-  EXPECT_THROW(MapSurface(slam_.map(), {.model = {.voxel = 0}}), std::invalid_argument);
-  EXPECT_NE(MapSurfaceOptions{.model = {.voxel = 0}}.invalid_reason().find("model.voxel"), std::string::npos);
+  EXPECT_THROW(MapSurface(slam_.map(), {.model = {.voxel_size = 0}}), std::invalid_argument);
+  EXPECT_NE(MapSurfaceOptions{.model = {.voxel_size = 0}}.invalid_reason().find("model.voxel_size"),
+            std::string::npos);
   DistanceBox box;
   EXPECT_THROW((void)surface_.snapshot().distances(box), std::invalid_argument);
 }

@@ -44,11 +44,11 @@ struct WallFrame {
 
 TEST(SurfaceModel, TellsWhatChangedInTheMesh) {
   const WallFrame wall;
-  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  SurfaceModel model(depth_camera(), {.voxel_size = 0.02});
   EXPECT_EQ(model.mesh_changes(0).revision, 0U);
   ASSERT_GT(model.add(wall.view(), {}), 0);
   const SurfaceChanges first = model.mesh_changes(0);
-  EXPECT_DOUBLE_EQ(first.edge, 0.16);
+  EXPECT_DOUBLE_EQ(first.cell_size, 0.16);
   std::size_t triangles = 0;
   for (const SurfacePiece& piece : first.pieces) triangles += piece.mesh.triangles.size();
   EXPECT_EQ(triangles, model.mesh().triangles.size());
@@ -58,7 +58,7 @@ TEST(SurfaceModel, TellsWhatChangedInTheMesh) {
   const SurfaceChanges second = model.mesh_changes(first.revision);
   EXPECT_GT(second.revision, first.revision);
   EXPECT_EQ(second.pieces.size(), first.pieces.size());
-  for (const SurfacePiece& piece : second.pieces) EXPECT_GT(piece.cell[0] * second.edge, 5);
+  for (const SurfacePiece& piece : second.pieces) EXPECT_GT(piece.cell[0] * second.cell_size, 5);
   model.clear();
   for (const SurfacePiece& piece : model.mesh_changes(second.revision).pieces)
     EXPECT_TRUE(piece.mesh.triangles.empty());
@@ -66,7 +66,7 @@ TEST(SurfaceModel, TellsWhatChangedInTheMesh) {
 
 TEST(SurfaceModel, TellsFreeFromOccupiedAndUnknown) {
   const WallFrame wall;
-  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  SurfaceModel model(depth_camera(), {.voxel_size = 0.02});
   // The camera stands at x = 10 m in the world.
   const Pose T_world_camera{{0, 0, 0, 1}, {10, 0, 0}};
   for (int n = 0; n < 3; ++n) EXPECT_GT(model.add(wall.view(), T_world_camera), kWidth * kHeight / 2);
@@ -109,7 +109,7 @@ WallFrame far_wall() {
 
 TEST(SurfaceModel, KnowsTheFreeSpaceThatItSawThrough) {
   const WallFrame wall = far_wall();
-  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  SurfaceModel model(depth_camera(), {.voxel_size = 0.02});
   const Pose T_world_camera{{0, 0, 0, 1}, {10, 0, 0}};
   ASSERT_GT(model.add(wall.view(), T_world_camera), 0);
   const SpacePoint before = model.at({10, 0, 2});
@@ -132,8 +132,8 @@ TEST(SurfaceModel, KnowsTheFreeSpaceThatItSawThrough) {
 
 TEST(SurfaceModel, KeepsFreeSpaceAsFarAsItIsTold) {
   const WallFrame wall = far_wall();
-  SurfaceModel all(depth_camera(), {.voxel = 0.02});
-  SurfaceModel near(depth_camera(), {.voxel = 0.02, .max_free_depth = 1.5});
+  SurfaceModel all(depth_camera(), {.voxel_size = 0.02});
+  SurfaceModel near(depth_camera(), {.voxel_size = 0.02, .max_free_depth = 1.5});
   ASSERT_GT(all.add(wall.view(), {}), 0);
   ASSERT_GT(near.add(wall.view(), {}), 0);
   EXPECT_EQ(near.at({0, 0, 1.2}).state, SpaceState::kFree);
@@ -145,7 +145,7 @@ TEST(SurfaceModel, KeepsFreeSpaceAsFarAsItIsTold) {
 TEST(SurfaceModel, DoesNotSeeThroughAHoleInTheDepth) {
   WallFrame wall = far_wall();
   draw_box(wall, 78, 82, 58, 62, 0);
-  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  SurfaceModel model(depth_camera(), {.voxel_size = 0.02});
   ASSERT_GT(model.add(wall.view(), {}), 0);
   EXPECT_EQ(model.at({0, 0, 2}).state, SpaceState::kUnknown);
   EXPECT_EQ(model.at({0.5, 0, 2}).state, SpaceState::kFree);
@@ -154,7 +154,7 @@ TEST(SurfaceModel, DoesNotSeeThroughAHoleInTheDepth) {
 TEST(SurfaceModel, SeesNothingThroughAPillarThinnerThanACell) {
   WallFrame wall = far_wall();
   draw_box(wall, 79, 81, 0, kHeight, 1900);  // 3 cm wide
-  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  SurfaceModel model(depth_camera(), {.voxel_size = 0.02});
   ASSERT_GT(model.add(wall.view(), {}), 0);
   EXPECT_NE(model.at({0.005, 0, 1.94}).state, SpaceState::kFree);
   EXPECT_NE(model.at({0.02, 0.3, 2.3}).state, SpaceState::kFree);
@@ -164,7 +164,7 @@ TEST(SurfaceModel, SeesNothingThroughAPillarThinnerThanACell) {
 
 TEST(SurfaceModel, WhatComesToStandInFreeSpaceIsNotFreeInside) {
   WallFrame wall = far_wall();
-  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  SurfaceModel model(depth_camera(), {.voxel_size = 0.02});
   for (int n = 0; n < 3; ++n) ASSERT_GT(model.add(wall.view(), {}), 0);
   EXPECT_EQ(model.at({0, 0, 1.55}).state, SpaceState::kFree);
   EXPECT_EQ(model.at({0, 0, 2.2}).state, SpaceState::kFree);
@@ -183,7 +183,7 @@ TEST(SurfaceModel, WhatComesToStandInFreeSpaceIsNotFreeInside) {
 
 TEST(SurfaceModel, KeepsTheNextRoomFreeBehindAWall) {
   const WallFrame wall = far_wall();
-  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  SurfaceModel model(depth_camera(), {.voxel_size = 0.02});
   // From 4 m behind the wall, away from it; then the wall from this side.
   ASSERT_GT(model.add(wall.view(), {{0, 0, 0, 1}, {0, 0, 4}}), 0);
   EXPECT_EQ(model.at({0, 0, 6}).state, SpaceState::kFree);
@@ -218,7 +218,7 @@ TEST(SurfaceModel, OfAPairEndsWhereTheRigSays) {
 }
 
 TEST(SurfaceModel, KnowsNothingOfPositionsThatAreNoNumbers) {
-  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  SurfaceModel model(depth_camera(), {.voxel_size = 0.02});
   for (int n = 0; n < 3; ++n) ASSERT_GT(model.add(far_wall().view(), {}), 0);
   const std::array<double, 3> free{0, 0, 1};
   ASSERT_EQ(model.at(free).state, SpaceState::kFree);
@@ -235,10 +235,12 @@ TEST(SurfaceModel, KnowsNothingOfPositionsThatAreNoNumbers) {
 TEST(SurfaceModel, KnowsTheNearestSurfaceWhicheverWayItLies) {
   WallFrame frame = far_wall();
   draw_box(frame, 0, 80, 0, kHeight, 1500);
-  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  SurfaceModel model(depth_camera(), {.voxel_size = 0.02});
   ASSERT_GT(model.add(frame.view(), {}), 0);
-  const DistanceField field =
-      model.distances({.lowest = {-0.5, -0.4, 1.1}, .highest = {0.5, 0.4, 3.05}, .cell = 0.04, .reach = 0.8});
+  const DistanceField field = model.distances({.min_corner = {-0.5, -0.4, 1.1},
+                                               .max_corner = {0.5, 0.4, 3.05},
+                                               .resolution = 0.04,
+                                               .max_distance = 0.8});
   EXPECT_EQ(field.size, (std::array<std::int32_t, 3>{25, 20, 49}));
   ASSERT_EQ(field.distances.size(), 25U * 20U * 49U);
   ASSERT_EQ(field.states.size(), field.distances.size());
@@ -265,9 +267,12 @@ TEST(SurfaceModel, KnowsTheNearestSurfaceWhicheverWayItLies) {
 TEST(SurfaceModel, TakesTheUnknownForAnObstacleWhereItIsAsked) {
   WallFrame frame = far_wall();
   draw_box(frame, 0, 80, 0, kHeight, 1500);
-  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  SurfaceModel model(depth_camera(), {.voxel_size = 0.02});
   ASSERT_GT(model.add(frame.view(), {}), 0);
-  DistanceBox box{.lowest = {-0.2, -0.2, 1.8}, .highest = {0.6, 0.2, 2.6}, .cell = 0.04, .reach = 0.5};
+  DistanceBox box{.min_corner = {-0.2, -0.2, 1.8},
+                  .max_corner = {0.6, 0.2, 2.6},
+                  .resolution = 0.04,
+                  .max_distance = 0.5};
   const std::array<double, 3> beside{0.3, 0, 2.2};
   EXPECT_NEAR(model.distances(box).at(beside).distance, 0.5, 0.01);
   box.unknown_is_obstacle = true;
@@ -278,36 +283,36 @@ TEST(SurfaceModel, TakesTheUnknownForAnObstacleWhereItIsAsked) {
 }
 
 TEST(SurfaceModel, SaysWhichBoxesHaveNoDistances) {
-  const SurfaceModel model(depth_camera(), {.voxel = 0.02});
-  const DistanceBox valid{.lowest = {0, 0, 0}, .highest = {1, 1, 1}};
+  const SurfaceModel model(depth_camera(), {.voxel_size = 0.02});
+  const DistanceBox valid{.min_corner = {0, 0, 0}, .max_corner = {1, 1, 1}};
   EXPECT_EQ(valid.invalid_reason(), "");
   for (const float distance : model.distances(valid).distances) EXPECT_EQ(distance, 1);  // of nothing at all
   const auto refused = [&](DistanceBox box, const char* why) {
     EXPECT_NE(box.invalid_reason().find(why), std::string::npos) << box.invalid_reason();
     EXPECT_THROW(static_cast<void>(model.distances(box)), std::invalid_argument) << why;
   };
-  refused({.highest = {1, 1, 0}}, "highest");
-  refused({.lowest = {0, NAN, 0}, .highest = {1, 1, 1}}, "lowest");
-  refused({.highest = {1, 1, 1e9}}, "highest");
-  refused({.highest = {1, 1, 1}, .cell = 0}, "cell");
-  refused({.highest = {1, 1, 1}, .reach = 0}, "reach");
-  refused({.highest = {100, 100, 100}, .cell = 0.01}, "cells");
+  refused({.max_corner = {1, 1, 0}}, "max_corner");
+  refused({.min_corner = {0, NAN, 0}, .max_corner = {1, 1, 1}}, "min_corner");
+  refused({.max_corner = {1, 1, 1e9}}, "max_corner");
+  refused({.max_corner = {1, 1, 1}, .resolution = 0}, "resolution");
+  refused({.max_corner = {1, 1, 1}, .max_distance = 0}, "max_distance");
+  refused({.max_corner = {100, 100, 100}, .resolution = 0.01}, "cells");
 }
 
 TEST(SurfaceModel, OptionsSayWhyTheyAreInvalid) {
-  testing::expect_rules<SurfaceModelOptions>({{"voxel", [](auto& o) { o.voxel = 11; }},
+  testing::expect_rules<SurfaceModelOptions>({{"voxel_size", [](auto& o) { o.voxel_size = 11; }},
                                               {"max_depth", [](auto& o) { o.max_depth = -1; }},
                                               {"max_free_depth", [](auto& o) { o.max_free_depth = -1; }},
-                                              {"nearest_stereo", [](auto& o) { o.nearest_stereo = 0; }}});
+                                              {"min_stereo_depth", [](auto& o) { o.min_stereo_depth = 0; }}});
 }
 
 TEST(SurfaceModel, RefusesWhatMakesNoSense) {
-  EXPECT_THROW(SurfaceModel(depth_camera(), {.voxel = 0}), std::invalid_argument);
-  EXPECT_THROW(SurfaceModel(depth_camera(), {.voxel = std::numeric_limits<double>::quiet_NaN()}),
+  EXPECT_THROW(SurfaceModel(depth_camera(), {.voxel_size = 0}), std::invalid_argument);
+  EXPECT_THROW(SurfaceModel(depth_camera(), {.voxel_size = std::numeric_limits<double>::quiet_NaN()}),
                std::invalid_argument);
   EXPECT_THROW(SurfaceModel(depth_camera(), {.max_free_depth = -1}), std::invalid_argument);
   EXPECT_THROW(SurfaceModel{CameraRig()}, std::invalid_argument);
-  SurfaceModel model(depth_camera(), {.voxel = 0.02});
+  SurfaceModel model(depth_camera(), {.voxel_size = 0.02});
   WallFrame wall;
   FrameView frame = wall.view();
   frame.depth.height = 60;
