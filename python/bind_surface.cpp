@@ -26,7 +26,7 @@ struct Shared {
   mutable std::shared_mutex mutex;  // never held by a thread that wants the interpreter's lock
 };
 using Model = Shared<SurfaceModel>;
-using OfMap = Shared<MapSurface>;
+using OfMap = Shared<MapSurface>;  // whose snapshots need no turn
 
 /// An array over values that it owns from now on.
 template <class T>
@@ -236,6 +236,22 @@ void bind_map_surface(py::module_& module) {
           "map_part", [](const SurfaceSnapshot& self) { return known_id(self.map_part()); },
           "Whose world positions are in; None: of nothing.");
   bind_questions(snapshot, [](const SurfaceSnapshot& self, const auto& question) { return question(self); });
+  py::class_<SurfaceUpdate>(module, "SurfaceUpdate",
+                            "What MapSurface.update did, and what was left out since the update before.")
+      .def_readonly("fused", &SurfaceUpdate::fused, "Keyframes whose depth was added.")
+      .def_readonly("fused_anew", &SurfaceUpdate::fused_anew,
+                    "Depth images that were fused once more, since poses in their submaps had changed.")
+      .def_readonly("no_readings", &SurfaceUpdate::no_readings, "Keyframes without depth in range.")
+      .def_readonly("beyond_memory", &SurfaceUpdate::beyond_memory,
+                    "Keyframes left out: memory_mb is reached.")
+      .def_readonly("discarded", &SurfaceUpdate::discarded, "Frames that are no keyframes of the map.")
+      .def_readonly("overtaken", &SurfaceUpdate::overtaken, "Oldest frames of more than 64 that waited.")
+      .def_readonly("waiting", &SurfaceUpdate::waiting, "Frames whose keyframes the map does not have yet.")
+      .def("__repr__", [](const SurfaceUpdate& self) {
+        return fmt::format(
+            "<SurfaceUpdate: {} fused, {} anew, {} left out, {} waiting>", self.fused, self.fused_anew,
+            self.no_readings + self.beyond_memory + self.discarded + self.overtaken, self.waiting);
+      });
   py::class_<OfMap>(module, "MapSurface",
                     "The surface of a run's keyframes, which moves with its map: as `twofold run --surface` "
                     "makes it.")
@@ -259,31 +275,25 @@ void bind_map_surface(py::module_& module) {
           },
           py::arg("frame"), py::arg("number"),
           "The frame of a keyframe (PoseEstimate.keyframe), before or after the map has it; number: "
-          "PoseEstimate.frame.\nRaises ValueError for images that do not fit the rig.")
+          "PoseEstimate.frame.\nRaises ValueError for images that do not fit the rig, and for a number that "
+          "does not grow.")
       .def(
           "update",
           [](OfMap& self, const MapRows& map) {
             const py::gil_scoped_release unlocked;
             const std::unique_lock lock(self.mutex);
-            self.surface.update(map.snapshot);
+            return self.surface.update(map.snapshot);
           },
-          py::arg("map"), "Takes the newest map: submaps move, and all that waits is fused.")
+          py::arg("map"),
+          "Takes the newest map: submaps move, and all that waits is fused. A SurfaceUpdate says how much, "
+          "and "
+          "what was left out.")
       .def(
-          "snapshot",
-          [](OfMap& self) {
-            const py::gil_scoped_release unlocked;
-            const std::unique_lock lock(self.mutex);
-            return self.surface.snapshot();
-          },
-          "As of the last update: a SurfaceSnapshot, for any thread.")
+          "snapshot", [](const OfMap& self) { return self.surface.snapshot(); },
+          "As of the end of the last update: a SurfaceSnapshot. Waits for no update.")
       .def(
-          "memory_bytes",
-          [](OfMap& self) {
-            const py::gil_scoped_release unlocked;
-            const std::shared_lock lock(self.mutex);
-            return self.surface.memory_bytes();
-          },
-          "Of samples and depth images.");
+          "memory_bytes", [](const OfMap& self) { return self.surface.memory_bytes(); },
+          "Of samples and depth images, at the end of the last call of add or update.");
 }
 
 }  // namespace

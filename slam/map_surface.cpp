@@ -1,3 +1,4 @@
+#include <atomic>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
@@ -39,14 +40,16 @@ struct SurfaceSnapshot::Impl {
 
   [[nodiscard]] const Joined& joined() const {
     const std::scoped_lock lock(mutex);
-    if (!joined_) joined_.emplace(options, submaps);
+    if (!joined_) {
+      joined_.emplace(options, submaps);
+      joined_bytes_ = joined_->volume.bytes() + joined_->free.bytes();
+    }
     return *joined_;
   }
   [[nodiscard]] std::size_t bytes() const {
-    std::size_t sum = sizeof(Impl);
+    std::size_t sum = sizeof(Impl) + joined_bytes_;
     for (const SharedSubmap& submap : submaps) sum += submap.volume->bytes() + submap.free->bytes();
-    const std::scoped_lock lock(mutex);
-    return joined_ ? sum + joined_->volume.bytes() + joined_->free.bytes() : sum;
+    return sum;
   }
 
   const SurfaceOptions options;
@@ -57,6 +60,7 @@ struct SurfaceSnapshot::Impl {
  private:
   mutable std::mutex mutex;  // guards joined_ until it is there; then it does not change
   mutable std::optional<Joined> joined_;
+  mutable std::atomic<std::size_t> joined_bytes_{0};
 };
 
 SurfaceSnapshot::SurfaceSnapshot() = default;
@@ -108,11 +112,42 @@ struct MapSurface::Impl {
   Rig rig;
   double min_stereo_depth;
   SurfaceOptions options;
+  void publish(KeyframeId part);
+  /// What has been counted since the last call.
+  [[nodiscard]] SurfaceUpdate take_counts();
+
   SubmapSurface submaps;
+  SubmapReport counted;  ///< as far as updates have told
   std::int64_t newest_frame = -1;
   std::uint64_t version = 0;
-  KeyframeId part = kNoKeyframe;
+  std::atomic<std::size_t> bytes{0};
+
+  std::mutex mutex;  // guards `published`, while a pointer is copied or exchanged
+  std::shared_ptr<const SurfaceSnapshot::Impl> published;
 };
+
+void MapSurface::Impl::publish(KeyframeId part) {
+  std::vector<SharedSubmap> of_part = submaps.share();
+  std::erase_if(of_part, [&](const SharedSubmap& submap) { return submap.part != part; });
+  auto next =
+      std::make_shared<const SurfaceSnapshot::Impl>(options, std::move(of_part), version, index(part));
+  const std::scoped_lock lock(mutex);
+  published.swap(next);  // the one before, if nobody else has it, is destroyed after the lock
+}
+
+SurfaceUpdate MapSurface::Impl::take_counts() {
+  const SubmapReport& now = submaps.report();
+  SurfaceUpdate update;
+  update.fused_anew = now.fused_anew - counted.fused_anew;
+  update.fused = now.fused - counted.fused - update.fused_anew;
+  update.no_readings = now.without_readings - counted.without_readings;
+  update.beyond_memory = now.beyond_memory - counted.beyond_memory;
+  update.discarded = now.not_in_map - counted.not_in_map;
+  update.overtaken = now.overtaken - counted.overtaken;
+  update.waiting = static_cast<int>(submaps.waiting());
+  counted = now;
+  return update;
+}
 
 namespace {
 
@@ -143,26 +178,28 @@ void MapSurface::add(const FrameView& frame, std::int64_t number) {
   const DepthFrame images = depth_frame(impl_->rig, frame, impl_->min_stereo_depth);
   impl_->submaps.offer(pack_keyframe_depth(number, images.depth, images.colour));
   impl_->newest_frame = number;
+  impl_->bytes = impl_->submaps.bytes();
 }
 
-void MapSurface::update(const MapSnapshot& map) {
+SurfaceUpdate MapSurface::update(const MapSnapshot& map) {
   const GraphSnapshot& graph = map.impl_->map->graph;
   if (graph.version() < impl_->version)
     throw std::invalid_argument("the map is of version " + std::to_string(graph.version()) + ", after " +
                                 std::to_string(impl_->version));
   impl_->submaps.step(graph);
   impl_->version = graph.version();
-  impl_->part = graph.reference() == kNoKeyframe ? kNoKeyframe : graph.part(graph.reference());
+  impl_->bytes = impl_->submaps.bytes();
+  if (graph.reference() != kNoKeyframe) impl_->publish(graph.part(graph.reference()));
+  return impl_->take_counts();
 }
 
-SurfaceSnapshot MapSurface::snapshot() {
-  if (impl_->part == kNoKeyframe) return {};
-  return SurfaceSnapshot(std::make_shared<const SurfaceSnapshot::Impl>(
-      impl_->options, impl_->submaps.share(impl_->part), impl_->version, index(impl_->part)));
+SurfaceSnapshot MapSurface::snapshot() const {
+  const std::scoped_lock lock(impl_->mutex);
+  return SurfaceSnapshot(impl_->published);
 }
 
 std::size_t MapSurface::memory_bytes() const {
-  return impl_->submaps.bytes();
+  return impl_->bytes;
 }
 
 }  // namespace twofold

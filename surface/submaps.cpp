@@ -253,13 +253,12 @@ std::vector<PlacedVolume> SubmapSurface::placed_in(const GraphSnapshot& graph, K
   return volumes;
 }
 
-std::vector<SharedSubmap> SubmapSurface::share(KeyframeId part) {
+std::vector<SharedSubmap> SubmapSurface::share() {
   std::vector<SharedSubmap> shared;
   for (const auto& submap : submaps_) {
-    if (submap->part != part) continue;
     Submap::Content& content = submap->content;
     content.volume_shared = content.free_shared = true;
-    shared.push_back({content.volume, content.free, submap->T_w_s});
+    shared.push_back({submap->part, content.volume, content.free, submap->T_w_s});
   }
   return shared;
 }

@@ -45,6 +45,7 @@ struct KeyframeDepth {
 
 /// A submap at its place, which nobody changes any more.
 struct SharedSubmap {
+  KeyframeId part{0};  ///< the map part whose world T_w_s is of
   std::shared_ptr<const SurfaceVolume> volume;
   std::shared_ptr<const FreeSpace> free;  ///< without anything unless SubmapOptions::free_space
   SE3 T_w_s;
@@ -107,9 +108,9 @@ class SubmapSurface {
   /// The same, but where a newer map than that of the last step has them.
   [[nodiscard]] std::vector<PlacedVolume> placed_in(const GraphSnapshot& graph, KeyframeId part) const;
 
-  /// The submaps of a map part for whoever asks about them later, on any thread: takes no time, and each is
-  /// copied before it changes.
-  [[nodiscard]] std::vector<SharedSubmap> share(KeyframeId part);
+  /// The submaps of all map parts for whoever asks about them later, on any thread: takes no time, and each
+  /// is copied before it changes.
+  [[nodiscard]] std::vector<SharedSubmap> share();
 
   [[nodiscard]] const SubmapReport& report() const { return report_; }
   [[nodiscard]] std::size_t submap_count() const { return submaps_.size(); }

@@ -166,7 +166,8 @@ class TWOFOLD_API SurfaceModel {
 
 struct MapSurfaceOptions {
   SurfaceModelOptions model = {};  ///< of samples and depth images, as those of SurfaceModel
-  /// Of samples and depth images [MiB] > 0: with more than this no keyframe is added.
+  /// Of samples and depth images [MiB] > 0: with more than this no keyframe is added, and
+  /// SurfaceUpdate::beyond_memory counts it.
   double memory_mb = 2000;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
@@ -194,7 +195,7 @@ class TWOFOLD_API SurfaceSnapshot {
   /// As SurfaceModel::mesh.
   [[nodiscard]] SurfaceMesh mesh() const;
   /// What it keeps: its submaps, which the surface and other snapshots may have, too, and once it was asked
-  /// what they are joined into.
+  /// what they are joined into. Does not wait for who joins them.
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
@@ -204,18 +205,35 @@ class TWOFOLD_API SurfaceSnapshot {
   std::shared_ptr<const Impl> impl_;
 };
 
+/// What MapSurface::update did, and what was left out since the update before.
+struct SurfaceUpdate {
+  int fused = 0;        ///< keyframes whose depth was added
+  int fused_anew = 0;   ///< depth images that were fused once more, since poses in their submaps had changed
+  int no_readings = 0;  ///< keyframes without depth in range
+  int beyond_memory = 0;  ///< keyframes left out: MapSurfaceOptions::memory_mb is reached
+  int discarded = 0;      ///< frames that are no keyframes of the map: rejected, or culled before an update
+  int overtaken = 0;      ///< oldest frames of more than 64 that waited: call update more often
+  int waiting = 0;        ///< frames whose keyframes the map does not have yet
+
+  friend bool operator==(const SurfaceUpdate&, const SurfaceUpdate&) = default;
+};
+
 /// The surface of a run's keyframes, which moves with the map: as `twofold run --surface` makes it.
 ///
 ///   MapSurface surface(slam.map(), {.model = {.voxel_size = 0.02}});
 ///   ... for keyframes, in a thread of yours:
 ///   surface.add(frame, estimate.frame);
 ///   surface.update(slam.map());
-///   const SurfaceSnapshot now = surface.snapshot();  // for planners, on their threads
+///   ... in a planner's thread:
+///   const SurfaceSnapshot now = surface.snapshot();
 ///
 /// Keyframes are fused into submaps that hang on the map: a loop moves them, and those inside which poses
 /// have moved by more than half a voxel are fused anew. Depth images are kept for that, compressed, as long
-/// as their keyframes are in the map. add, update and snapshot by one thread at a time. Holding a snapshot
-/// blocks nobody: `update` copies a shared submap before changing it, which costs memory.
+/// as their keyframes are in the map.
+///
+/// Threads: add and update by one at a time; snapshot and memory_bytes by any, always, also meanwhile: they
+/// wait for nobody. Holding a snapshot blocks nobody: `update` copies a shared submap before changing it,
+/// which costs memory.
 class TWOFOLD_API MapSurface {
  public:
   /// @param map  of the run, before its first keyframe: it tells the rig, and what comes of a loaded map
@@ -229,15 +247,22 @@ class TWOFOLD_API MapSurface {
   /// or after the map has it. If the mapper rejects the proposal, the frame is discarded once `update` sees a
   /// later keyframe. At most 64 wait; then the oldest is discarded. A stereo pair takes about 100 ms, because
   /// its depth is computed here; a depth image is only compressed.
-  /// @param number  PoseEstimate::frame; it grows
-  /// Throws std::invalid_argument saying what is wrong with the images.
+  /// (`twofold run --surface` keeps 48 whole images before that, which nobody has looked at yet.) Pixels are
+  /// not used any more once it returns.
+  /// @param number  PoseEstimate::frame
+  /// Throws std::invalid_argument saying what is wrong with the images, or when `number` is not greater than
+  /// that of the call before.
   void add(const FrameView& frame, std::int64_t number);
-  /// Takes the newest map: submaps move, and all that waits is fused. Throws std::invalid_argument for an
-  /// older one than that of the last call, std::bad_alloc when memory ends.
-  void update(const MapSnapshot& map);
-  /// As of the last update, of the map part in which the camera was then. Takes microseconds.
-  [[nodiscard]] SurfaceSnapshot snapshot();
-  /// Of samples and depth images.
+  /// Takes the newest map: submaps move, all that waits is fused, and what came of it is the snapshot from
+  /// then on. Takes about as long as SurfaceModel::add of a depth image for each keyframe, and after a loop
+  /// for each depth image of the submaps that it bent: `fused` and `fused_anew` times. Throws
+  /// std::invalid_argument for an older map than that of the last call, std::bad_alloc when memory ends.
+  SurfaceUpdate update(const MapSnapshot& map);
+  /// As of the end of the last update, of the map part in which the camera was then; of nothing before the
+  /// first. O(1).
+  [[nodiscard]] SurfaceSnapshot snapshot() const;
+  /// Of samples and depth images, at the end of the last call of add or update. While an update lasts, and as
+  /// long as older snapshots are held, what it changes is there twice.
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -107,6 +108,40 @@ def test_a_runs_surface_follows_its_map() -> None:
         assert now.memory_bytes() > 0 and surface.memory_bytes() > 0
         with pytest.raises(ValueError, match="number"):
             surface.add(frame, 0)
+
+
+def test_snapshots_do_not_wait_for_an_update() -> None:
+    source = twofold.Source(SCENE)
+    updating = threading.Event()
+    done = threading.Event()
+    taken = 0
+
+    def take_snapshots(surface: twofold.MapSurface) -> None:
+        nonlocal taken
+        while not done.is_set():
+            before = updating.is_set()
+            surface.snapshot()
+            taken += before and updating.is_set()
+
+    with twofold.Slam(source.rig, mode=twofold.RunMode.DETERMINISTIC) as slam:
+        surface = twofold.MapSurface(slam.map(), voxel_size=0.01)
+        planner = threading.Thread(target=take_snapshots, args=(surface,))
+        planner.start()
+        updates = []
+        for frame in source:
+            slam.push(frame)
+            pose = slam.latest()
+            if pose is None or not pose.keyframe:
+                continue
+            surface.add(frame, pose.frame)
+            updating.set()
+            updates.append(surface.update(slam.map()))
+            updating.clear()
+        done.set()
+        planner.join()
+    assert sum(update.fused for update in updates) == len(updates)
+    assert "1 fused" in repr(updates[0])
+    assert taken > 20 * len(updates), "one update, one snapshot, if they took turns"
 
 
 def test_the_example_runs(tmp_path: Path) -> None:

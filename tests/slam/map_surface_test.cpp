@@ -1,12 +1,10 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <optional>
 #include <stdexcept>
-#include <thread>
 
 #include "tests/io/scratch_folder.hpp"
 #include "twofold/slam.hpp"
@@ -23,7 +21,7 @@ class MapSurfaceTest : public ::testing::Test {
   static constexpr double kVoxel = 0.03;
 
   /// Until so many keyframes more have been added, or the source ends.
-  void add_keyframes(int count) {
+  SurfaceUpdate add_keyframes(int count) {
     for (FrameView frame; count > 0 && source_.next(frame);) {
       slam_.push(frame);
       pose_ = slam_.latest();
@@ -31,7 +29,7 @@ class MapSurfaceTest : public ::testing::Test {
       surface_.add(frame, pose_->frame);
       --count;
     }
-    surface_.update(slam_.map());
+    return surface_.update(slam_.map());
   }
   [[nodiscard]] std::array<double, 3> ahead(double metres) const {
     return transform(pose_->T_world_camera, {0, 0, metres});
@@ -41,6 +39,7 @@ class MapSurfaceTest : public ::testing::Test {
   Slam slam_{source_.rig(), {.mode = RunMode::kDeterministic}};
   MapSurface surface_{slam_.map(), {.model = {.voxel_size = kVoxel}}};
   std::optional<PoseEstimate> pose_;
+  FrameView frame_;
 };
 
 TEST_F(MapSurfaceTest, AnswersWhatIsFreeAndWhereTheNextSurfaceIs) {
@@ -87,23 +86,31 @@ TEST_F(MapSurfaceTest, ASnapshotStaysAsItWas) {
   EXPECT_LT(early.map_version(), surface_.snapshot().map_version());
 }
 
-TEST_F(MapSurfaceTest, IsAskedByOneThreadWhileAnotherMakesIt) {
-  add_keyframes(2);
-  const SurfaceSnapshot early = surface_.snapshot();
-  const std::size_t triangles = early.mesh().triangles.size();
-  const SurfaceSnapshot unasked = surface_.snapshot();
-  std::atomic<bool> done{false};
-  int asked = 0;
-  std::thread reader([&] {
-    do {
-      EXPECT_EQ(unasked.mesh().triangles.size(), triangles);
-      ++asked;
-    } while (!done);
-  });
-  add_keyframes(1000);
-  done = true;
-  reader.join();
-  EXPECT_GT(asked, 0);
+TEST_F(MapSurfaceTest, ReportsWhatItFusedAndWhatItLeftOut) {
+  EXPECT_EQ(add_keyframes(1), SurfaceUpdate{.fused = 1});
+  EXPECT_EQ(add_keyframes(2).fused, 2);
+  EXPECT_EQ(surface_.update(slam_.map()), SurfaceUpdate()) << "nothing is told twice";
+
+  ASSERT_TRUE(source_.next(frame_));
+  MapSurface none(slam_.map(), {.model = {.voxel_size = kVoxel}});
+  for (int n = 0; n < 66; ++n) none.add(frame_, 1'000'000 + n);
+  EXPECT_EQ(none.update(slam_.map()), (SurfaceUpdate{.overtaken = 2, .waiting = 64}));
+}
+
+TEST_F(MapSurfaceTest, ReportsFramesThatAreNoKeyframesAndKeyframesBeyondItsMemory) {
+  MapSurface small(slam_.map(), {.model = {.voxel_size = kVoxel}, .memory_mb = 0.01});
+  int keyframes = 0;
+  while (keyframes < 3 && source_.next(frame_)) {
+    slam_.push(frame_);
+    pose_ = slam_.latest();
+    ASSERT_TRUE(pose_);
+    keyframes += pose_->keyframe;
+    small.add(frame_, pose_->frame);
+  }
+  const SurfaceUpdate update = small.update(slam_.map());
+  EXPECT_EQ(update.fused, 1);
+  EXPECT_EQ(update.beyond_memory, keyframes - 1);
+  EXPECT_EQ(update.discarded, pose_->frame + 1 - keyframes);
 }
 
 TEST_F(MapSurfaceTest, SaysWhatIsWrong) {
