@@ -195,10 +195,12 @@ void bind_model(py::module_& module) {
                  rig, model_options(voxel_size, max_depth, max_free_depth, min_stereo_depth));
            }),
            py::arg("rig"), py::kw_only(), py::arg("voxel_size") = 0.05, py::arg("max_depth") = 0.0,
-           py::arg("max_free_depth") = 0.0, py::arg("min_stereo_depth") = 0.4,
+           py::arg("max_free_depth") = 0.0, py::arg("min_stereo_depth") = 0.0,
            "voxel_size: distance of two samples [m]. Readings farther than max_depth begin no surface, and "
            "free "
            "space is kept as far\nas max_free_depth from the camera [m]; 0: as far as there are readings. "
+           "Stereo "
+           "depth is looked for from\nmin_stereo_depth on [m]; 0: from CameraRig.depth_min on. "
            "Raises ValueError for a rig without depth.")
       .def(
           "add",
@@ -254,7 +256,7 @@ void bind_map_surface(py::module_& module) {
       });
   py::class_<OfMap>(module, "MapSurface",
                     "The surface of a run's keyframes, which moves with its map: as `twofold run --surface` "
-                    "makes it.")
+                    "makes it, whose\nmin_stereo_depth is 0.4. Rows of a slipped stereo pair are taken back.")
       .def(py::init([](const MapRows& map, double voxel_size, double max_depth, double max_free_depth,
                        double min_stereo_depth, double memory_mb) {
              return std::make_unique<OfMap>(
@@ -263,7 +265,7 @@ void bind_map_surface(py::module_& module) {
                                    memory_mb});
            }),
            py::arg("map"), py::kw_only(), py::arg("voxel_size") = 0.05, py::arg("max_depth") = 0.0,
-           py::arg("max_free_depth") = 0.0, py::arg("min_stereo_depth") = 0.4, py::arg("memory_mb") = 2000.0,
+           py::arg("max_free_depth") = 0.0, py::arg("min_stereo_depth") = 0.0, py::arg("memory_mb") = 2000.0,
            "map: of the run, before its first keyframe; it tells the rig. Beyond memory_mb [MiB] no keyframe "
            "is added. The\nothers: as SurfaceModel.")
       .def(

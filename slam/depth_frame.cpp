@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "imaging/row_offset.hpp"
 #include "slam/frame_pixels.hpp"
 #include "surface/depth_view.hpp"
 #include "surface/stereo/stereo_depth.hpp"
@@ -20,14 +21,15 @@ cv::Mat colour_of(const ImageView& view) {
   return is_grey ? pixels_of(view, nullptr) : bgr_pixels_of(view);
 }
 
-cv::Mat depth_of_pair(const Rig& rig, const FrameView& frame, double min_stereo_depth) {
+cv::Mat depth_of_pair(const Rig& rig, const FrameView& frame, const PairMatching& matching) {
   expect_pixels("right", frame.right, false);
   const cv::Mat left = pixels_of(frame.left, nullptr);
   const cv::Mat right = pixels_of(frame.right, nullptr);
   const cv::Size size(rig.camera.width, rig.camera.height);
   if (left.size() != size || right.size() != size)
     throw std::invalid_argument("left and right image must both be of the rig's size");
-  return stereo_depth(rig, left, right, min_stereo_depth);
+  const double nearest = matching.min_depth > 0 ? matching.min_depth : rig.depth_min;
+  return stereo_depth(rig, left, without_row_offset(right, matching.row_offset), nearest);
 }
 
 }  // namespace
@@ -48,11 +50,11 @@ SurfaceOptions surface_options(const Rig& rig, const SurfaceModelOptions& option
   return surface;
 }
 
-DepthFrame depth_frame(const Rig& rig, const FrameView& frame, double min_stereo_depth) {
+DepthFrame depth_frame(const Rig& rig, const FrameView& frame, const PairMatching& matching) {
   expect_pixels("left", frame.left, false);
   DepthFrame images;
   if (rig.kind == SensorKind::kStereo) {
-    images.depth = depth_of_pair(rig, frame, min_stereo_depth);
+    images.depth = depth_of_pair(rig, frame, matching);
   } else {
     expect_pixels("depth", frame.depth, true);
     images.depth = depth_pixels_of(frame.depth, frame.owner, rig.depth_unit);

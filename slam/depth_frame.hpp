@@ -14,9 +14,15 @@ struct DepthFrame {
   cv::Mat colour;  ///< or brightness
 };
 
+/// How the depth of a pair is found.
+struct PairMatching {
+  double min_depth = 0;   ///< SurfaceModelOptions::min_stereo_depth
+  double row_offset = 0;  ///< rows that the right image lies lower, taken back before [px]
+};
+
 /// Of a depth image, or of a pair by semi-global matching. Throws std::invalid_argument saying what is wrong
 /// with the images.
-[[nodiscard]] DepthFrame depth_frame(const Rig& rig, const FrameView& frame, double min_stereo_depth);
+[[nodiscard]] DepthFrame depth_frame(const Rig& rig, const FrameView& frame, const PairMatching& matching);
 
 /// Throws std::invalid_argument for a rig without depth.
 [[nodiscard]] Rig expect_depth(const Rig& rig);

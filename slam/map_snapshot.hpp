@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 
@@ -14,6 +15,9 @@ struct TWOFOLD_HIDDEN MapSnapshot::Impl {
   Rig rig;
   std::shared_ptr<const MapVersion> map;
   std::uint32_t loaded_keyframes = 0;  ///< of the map that the run went on with, which has the first ids
+  /// Rows that right images lie lower than left ones, as the tracker takes them back now [px]: the run's, not
+  /// the version's. Null: of no run.
+  std::shared_ptr<const std::atomic<double>> row_offset = {};
 };
 
 }  // namespace twofold

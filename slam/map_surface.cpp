@@ -103,13 +103,15 @@ std::size_t SurfaceSnapshot::memory_bytes() const {
 }
 
 struct MapSurface::Impl {
-  Impl(const Rig& its_rig, const SurfaceModelOptions& its_options, const SubmapOptions& limits)
-      : rig(its_rig),
+  Impl(const MapSnapshot::Impl& map, const SurfaceModelOptions& its_options, const SubmapOptions& limits)
+      : rig(expect_depth(map.rig)),
+        row_offset(map.row_offset),
         min_stereo_depth(its_options.min_stereo_depth),
         options(surface_options(rig, its_options)),
         submaps(rig, options, limits) {}
 
   Rig rig;
+  std::shared_ptr<const std::atomic<double>> row_offset;  ///< of the run; null: of none
   double min_stereo_depth;
   SurfaceOptions options;
   void publish(KeyframeId part);
@@ -165,8 +167,7 @@ SubmapOptions submap_options(const MapSurfaceOptions& options, std::uint32_t loa
 }  // namespace
 
 MapSurface::MapSurface(const MapSnapshot& map, const MapSurfaceOptions& options)
-    : impl_(new Impl(expect_depth(map.impl_->rig), options.model,
-                     submap_options(options, map.impl_->loaded_keyframes))) {}
+    : impl_(new Impl(*map.impl_, options.model, submap_options(options, map.impl_->loaded_keyframes))) {}
 MapSurface::~MapSurface() = default;
 MapSurface::MapSurface(MapSurface&&) noexcept = default;
 MapSurface& MapSurface::operator=(MapSurface&&) noexcept = default;
@@ -175,7 +176,9 @@ void MapSurface::add(const FrameView& frame, std::int64_t number) {
   if (number <= impl_->newest_frame)
     throw std::invalid_argument("number " + std::to_string(number) + " comes after " +
                                 std::to_string(impl_->newest_frame));
-  const DepthFrame images = depth_frame(impl_->rig, frame, impl_->min_stereo_depth);
+  PairMatching matching{.min_depth = impl_->min_stereo_depth};
+  if (impl_->row_offset) matching.row_offset = impl_->row_offset->load(std::memory_order_relaxed);
+  const DepthFrame images = depth_frame(impl_->rig, frame, matching);
   impl_->submaps.offer(pack_keyframe_depth(number, images.depth, images.colour));
   impl_->newest_frame = number;
   impl_->bytes = impl_->submaps.bytes();

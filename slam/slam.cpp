@@ -126,8 +126,8 @@ class TWOFOLD_HIDDEN Slam::Impl {
   LatestValue<PoseEstimate> latest;
   MapLender maps;
   [[nodiscard]] MapSnapshot newest_map() {
-    return MapSnapshot(
-        std::make_shared<const MapSnapshot::Impl>(MapSnapshot::Impl{rig_, maps.newest(), loaded_keyframes_}));
+    return MapSnapshot(std::make_shared<const MapSnapshot::Impl>(
+        MapSnapshot::Impl{rig_, maps.newest(), loaded_keyframes_, row_offset_}));
   }
 
  private:
@@ -155,7 +155,9 @@ class TWOFOLD_HIDDEN Slam::Impl {
   const bool live_;
   const int frame_buffers_;
   const std::filesystem::path trace_;
-  std::uint32_t loaded_keyframes_ = 0;       // of the map that the run went on with: the first ids
+  std::uint32_t loaded_keyframes_ = 0;  // of the map that the run went on with: the first ids
+  // Written by the tracker, read by who makes a surface. Relaxed: a number, with which nothing else goes.
+  const std::shared_ptr<std::atomic<double>> row_offset_ = std::make_shared<std::atomic<double>>(0);
   std::atomic<bool> mapping_paused_{false};  // relaxed: a wish
   PoseReporter reporter_;                    // tracker's
   PoseEstimate estimate_;                    // likewise: of the frame in hand
@@ -180,6 +182,7 @@ class TWOFOLD_HIDDEN Slam::Impl {
 /// On the tracker's thread.
 void Slam::Impl::tell(const PoseReport& report) {
   const Telling telling(told_by_);
+  row_offset_->store(report.row_offset, std::memory_order_relaxed);
   reporter_.tell(report, on_event, [this](const PoseEstimate& pose) {
     estimate_ = pose;
     latest.put(estimate_);

@@ -25,7 +25,7 @@ std::string SurfaceModelOptions::invalid_reason() const {
       .within("voxel_size", voxel_size, 1e-4, 10)
       .at_least("max_depth", max_depth, 0)
       .at_least("max_free_depth", max_free_depth, 0)
-      .above("min_stereo_depth", min_stereo_depth, 0)
+      .at_least("min_stereo_depth", min_stereo_depth, 0)
       .reason();
 }
 
@@ -57,7 +57,7 @@ int SurfaceModel::add(const FrameView& frame, const Pose& T_world_camera) {
   const SE3 T_w_c = to_se3(T_world_camera);
   if (!(T_w_c.translation().norm() < kFarthest) || !T_w_c.matrix().allFinite())
     throw std::invalid_argument("T_world_camera is not finite, or farther than 100 km from the origin");
-  const DepthFrame images = depth_frame(rig, frame, impl_->options.min_stereo_depth);
+  const DepthFrame images = depth_frame(rig, frame, {.min_depth = impl_->options.min_stereo_depth});
   const DepthView view = make_depth_view(rig, images.depth, images.colour);
   const int readings = cv::countNonZero(view.depth);
   if (readings == 0) return 0;

@@ -19,8 +19,11 @@ struct SurfaceModelOptions {
   /// Free space away from surfaces is kept as far as this from the camera [m] >= 0; 0: as far as there are
   /// readings.
   double max_free_depth = 0;
-  double min_stereo_depth = 0.4;  ///< stereo: the nearest depth that is looked for [m] > 0; the nearer, the
-                                  ///< longer `add` takes
+  /// Stereo: depth is looked for from here on [m] >= 0; 0: from CameraRig::depth_min on. The nearer, the
+  /// longer `add` takes. Nothing nearer than any of three is seen: this, CameraRig::depth_min, and the depth
+  /// whose disparity is 0.4 of the image's width, 2.5 fx baseline / width. What is nearer leaves holes, and
+  /// some wrong depth where its texture repeats: a robot has to look for it otherwise.
+  double min_stereo_depth = 0;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] TWOFOLD_API std::string invalid_reason() const;
@@ -132,10 +135,10 @@ class TWOFOLD_API SurfaceModel {
   SurfaceModel& operator=(SurfaceModel&&) noexcept;
 
   /// Adds the depth of a rectified frame: its depth image, or, for stereo, by semi-global matching (rows of a
-  /// slipped right image are not taken back, as Slam does). The left image, which RGB-D needs, too, gives the
-  /// brightness, or the colours if it has them. Not for the thread that tracks: some 100 ms for a pair of 640
-  /// x 480, about 10 to 100 for a depth image, the more the smaller the voxel. Noise of depth images is taken
-  /// for that of a structured-light camera.
+  /// slipped right image are not taken back, as Slam and MapSurface do). The left image, which RGB-D needs,
+  /// too, gives the brightness, or the colours if it has them. Not for the thread that tracks: some 100 ms
+  /// for a pair of 640 x 480, about 10 to 100 for a depth image, the more the smaller the voxel. Noise of
+  /// depth images is taken for that of a structured-light camera.
   /// @return  pixels with depth within range; a frame with none changes nothing
   ///
   /// Throws std::invalid_argument saying what is wrong with the images or the pose, std::bad_alloc when
@@ -218,7 +221,9 @@ struct SurfaceUpdate {
   friend bool operator==(const SurfaceUpdate&, const SurfaceUpdate&) = default;
 };
 
-/// The surface of a run's keyframes, which moves with the map: as `twofold run --surface` makes it.
+/// The surface of a run's keyframes, which moves with the map: as `twofold run --surface` makes it, whose
+/// min_stereo_depth is 0.4. Rows of a slipped stereo pair are taken back, as far as the tracker knows of them
+/// when a frame is added.
 ///
 ///   MapSurface surface(slam.map(), {.model = {.voxel_size = 0.02}});
 ///   ... for keyframes, in a thread of yours:

@@ -62,7 +62,8 @@ struct CameraRig {
   /// Metres per unit of the depth image, > 0; stereo: of the depth that a surface is made of, which ends at
   /// 65535 of them.
   double depth_unit = 0.001;
-  double depth_min = 0.3;  ///< nearer readings are holes [m] > 0; stereo: of surfaces only
+  double depth_min = 0.3;  ///< nearer readings are holes [m] > 0; stereo: of surfaces only, which may begin
+                           ///< farther away (SurfaceModelOptions::min_stereo_depth)
   double depth_max = 8.0;  ///< farther ones likewise, finite and > depth_min
   /// Rolling shutter: from the exposure of the first row to that of the last [s], 0 to 0.5; 0: all rows at
   /// once. Nothing: not known, and found out while a camera turns to and fro; until then

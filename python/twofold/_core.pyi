@@ -357,7 +357,7 @@ class DistanceField:
 
 class SurfaceModel:
     def __init__(
-        self, rig: CameraRig, *, voxel_size: float = 0.05, max_depth: float = 0.0, max_free_depth: float = 0.0, min_stereo_depth: float = 0.4
+        self, rig: CameraRig, *, voxel_size: float = 0.05, max_depth: float = 0.0, max_free_depth: float = 0.0, min_stereo_depth: float = 0.0
     ) -> None: ...
     def add(self, frame: Frame, T_world_camera: Pose) -> int: ...
     def clear(self) -> None: ...
@@ -404,7 +404,7 @@ class MapSurface:
         voxel_size: float = 0.05,
         max_depth: float = 0.0,
         max_free_depth: float = 0.0,
-        min_stereo_depth: float = 0.4,
+        min_stereo_depth: float = 0.0,
         memory_mb: float = 2000.0,
     ) -> None: ...
     def add(self, frame: Frame, number: int) -> None: ...

@@ -1,10 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <stdexcept>
+#include <vector>
 
 #include "tests/io/scratch_folder.hpp"
 #include "twofold/slam.hpp"
@@ -140,6 +143,39 @@ TEST_F(MapSurfaceTest, BeforeTheFirstKeyframeNothingIsKnown) {
     EXPECT_EQ(field.states.size(), 8U);
     EXPECT_EQ(field.states[0], SpaceState::kUnknown);
   }
+}
+
+/// Of a stereo run whose right images lie `rows` lower.
+SurfaceSnapshot surface_of_pair(int rows) {
+  Source source("synthetic:desk?width=320&height=240&frames=40");
+  Slam slam(source.rig(), {.mode = RunMode::kDeterministic});
+  MapSurface surface(slam.map(), {.model = {.voxel_size = 0.02}});
+  for (FrameView frame; source.next(frame);) {
+    const auto* right = static_cast<const std::uint8_t*>(frame.right.data);
+    const std::ptrdiff_t lower = rows * frame.right.stride;
+    std::vector<std::uint8_t> slipped(static_cast<std::size_t>(frame.right.stride * frame.right.height));
+    std::copy(right, right + static_cast<std::ptrdiff_t>(slipped.size()) - lower, slipped.begin() + lower);
+    frame.right.data = slipped.data();
+    frame.owner = nullptr;
+    slam.push(frame);
+    const auto pose = slam.latest();
+    if (pose && pose->keyframe) surface.add(frame, pose->frame);
+  }
+  surface.update(slam.map());
+  return surface.snapshot();
+}
+
+TEST(MapSurface, RowsThatSlippedAreTakenBack) {
+  const SurfaceSnapshot aligned = surface_of_pair(0), slipped = surface_of_pair(2);
+  const SurfaceMesh mesh = slipped.mesh();
+  std::size_t near = 0;
+  for (const auto& x : mesh.positions) {
+    const SpacePoint there = aligned.at({x[0], x[1], x[2]});
+    near += there.state != SpaceState::kUnknown && std::abs(there.distance) < 0.03;
+  }
+  EXPECT_GT(static_cast<double>(near), 0.9 * static_cast<double>(mesh.positions.size()));
+  EXPECT_GT(static_cast<double>(mesh.positions.size()),
+            0.8 * static_cast<double>(aligned.mesh().positions.size()));
 }
 
 TEST_F(MapSurfaceTest, MeshesAreSavedByTheKindOfTheirName) {

@@ -192,17 +192,28 @@ TEST(SurfaceModel, KeepsTheNextRoomFreeBehindAWall) {
   EXPECT_EQ(model.at({0, 0, 6}).state, SpaceState::kFree);
 }
 
+/// A plane with texture before a pair.
+struct PairFrame {
+  explicit PairFrame(int disparity) : left(kWidth * kHeight), right(kWidth * kHeight) {
+    std::mt19937 random(3);
+    for (std::uint8_t& pixel : left) pixel = static_cast<std::uint8_t>(random() % 256);
+    std::copy(left.begin() + disparity, left.end(), right.begin());
+  }
+  [[nodiscard]] FrameView view() const {
+    FrameView frame;
+    frame.left = {left.data(), kWidth, kHeight, kWidth, ImageFormat::kGrey8};
+    frame.right = {right.data(), kWidth, kHeight, kWidth, ImageFormat::kGrey8};
+    return frame;
+  }
+  std::vector<std::uint8_t> left, right;
+};
+
 /// Texture 0.65 m away: 16 pixels of disparity.
 TEST(SurfaceModel, OfAPairEndsWhereTheRigSays) {
   CameraRig rig = depth_camera();
   rig.sensor = Sensor::kStereo;
-  std::mt19937 random(3);
-  std::vector<std::uint8_t> left(kWidth * kHeight), right(kWidth * kHeight);
-  for (std::uint8_t& pixel : left) pixel = static_cast<std::uint8_t>(random() % 256);
-  std::copy(left.begin() + 16, left.end(), right.begin());
-  FrameView frame;
-  frame.left = {left.data(), kWidth, kHeight, kWidth, ImageFormat::kGrey8};
-  frame.right = {right.data(), kWidth, kHeight, kWidth, ImageFormat::kGrey8};
+  const PairFrame pair(16);
+  const FrameView frame = pair.view();
   EXPECT_GT(SurfaceModel(rig).add(frame, {}), kWidth * kHeight / 4);
   rig.depth_max = 0.6;
   EXPECT_EQ(SurfaceModel(rig).add(frame, {}), 0);
@@ -215,6 +226,16 @@ TEST(SurfaceModel, OfAPairEndsWhereTheRigSays) {
   ASSERT_NO_THROW(SurfaceModel{rig});
   rig.baseline = 0.1 / rig.fx;  // in another unit
   EXPECT_THROW(SurfaceModel{rig}, std::invalid_argument);
+}
+
+/// Texture 0.26 m away: 40 pixels of disparity, more than at 0.4 m.
+TEST(SurfaceModel, OfAPairBeginsWhereTheRigSaysUnlessItIsToldOtherwise) {
+  CameraRig rig = depth_camera();
+  rig.sensor = Sensor::kStereo;
+  rig.depth_min = 0.25;
+  const PairFrame pair(40);
+  EXPECT_GT(SurfaceModel(rig).add(pair.view(), {}), kWidth * kHeight / 4);
+  EXPECT_LT(SurfaceModel(rig, {.min_stereo_depth = 0.4}).add(pair.view(), {}), kWidth * kHeight / 50);
 }
 
 TEST(SurfaceModel, KnowsNothingOfPositionsThatAreNoNumbers) {
@@ -300,10 +321,11 @@ TEST(SurfaceModel, SaysWhichBoxesHaveNoDistances) {
 }
 
 TEST(SurfaceModel, OptionsSayWhyTheyAreInvalid) {
-  testing::expect_rules<SurfaceModelOptions>({{"voxel_size", [](auto& o) { o.voxel_size = 11; }},
-                                              {"max_depth", [](auto& o) { o.max_depth = -1; }},
-                                              {"max_free_depth", [](auto& o) { o.max_free_depth = -1; }},
-                                              {"min_stereo_depth", [](auto& o) { o.min_stereo_depth = 0; }}});
+  testing::expect_rules<SurfaceModelOptions>(
+      {{"voxel_size", [](auto& o) { o.voxel_size = 11; }},
+       {"max_depth", [](auto& o) { o.max_depth = -1; }},
+       {"max_free_depth", [](auto& o) { o.max_free_depth = -1; }},
+       {"min_stereo_depth", [](auto& o) { o.min_stereo_depth = -1; }}});
 }
 
 TEST(SurfaceModel, RefusesWhatMakesNoSense) {
