@@ -34,7 +34,8 @@ def main(name: str = "synthetic:desk?sensor=rgbd&frames=60&width=320&height=240"
     free = metres[ahead["state"] == twofold.SpaceState.FREE.value]
     print(f"free ahead from {free.min():.2f} to {free.max():.2f} m" if len(free) else "nothing is known ahead")
     field = now.distances(here.t - 0.5, here.t + 0.5, resolution=0.1, max_distance=1)
-    print(f"within half a metre the nearest surface is {field.distances.min():.2f} m away")
+    # Negative in obstacles, and in what nobody has looked at.
+    print(f"within half a metre there are {max(field.distances.max(), 0):.2f} m of free space around some place")
     if mesh:
         now.mesh().save(mesh)
         print(f"{len(now.mesh().triangles)} triangles written to {mesh}")

@@ -111,7 +111,8 @@ void bind_distances(py::module_& module) {
             const auto& field = self.cast<const DistanceField&>();
             return view_of(field.distances.data(), shape(field), self);
           },
-          "(Z, Y, X) float32 [m], negative inside a surface: a read-only view.")
+          "(Z, Y, X) float32 [m], negative inside a surface and in unknown cells (unless distances was told "
+          "otherwise): a read-only view.")
       .def_property_readonly(
           "states",
           [shape](const py::object& self) {
@@ -135,8 +136,10 @@ constexpr const char* kAtDoc =
 constexpr const char* kDistancesDoc =
     "Of each cell of a box, as far as max_distance, how far the nearest surface is, whichever way it lies: a "
     "DistanceField.\nCorners are (3,) [m], resolution and max_distance in metres. Raises ValueError for more "
-    "than 2^26 "
-    "cells.";
+    "than 2^26 cells.\nUnknown space is an obstacle: cells there are negative, as far as it is to "
+    "free space, which the gradient leads to.\nunknown_is_obstacle=False: only surfaces count, and unknown "
+    "cells are "
+    "positive, also behind a wall: look at `states`.";
 
 /// Questions that both kinds of surfaces answer.
 template <class Class, class Questions>
@@ -161,7 +164,7 @@ void bind_questions(Class& surface, const Questions& questions) {
             });
           },
           py::arg("min_corner"), py::arg("max_corner"), py::kw_only(), py::arg("resolution") = 0.1,
-          py::arg("max_distance") = 1.0, py::arg("unknown_is_obstacle") = false, kDistancesDoc)
+          py::arg("max_distance") = 1.0, py::arg("unknown_is_obstacle") = true, kDistancesDoc)
       .def(
           "mesh",
           [questions](const typename Class::type& self) {

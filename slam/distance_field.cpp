@@ -1,7 +1,9 @@
 #include "slam/distance_field.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 
 #include "base/option_check.hpp"
 #include "surface/free_space/nearest_points.hpp"
@@ -29,6 +31,12 @@ struct Grid {
         origin(vector_of(box.min_corner).array() - border * box.resolution) {}
 
   [[nodiscard]] Eigen::Vector3i whole() const { return size.array() + 2 * border; }
+  /// Of a cell of the whole grid, as for_each_cell counts.
+  [[nodiscard]] std::size_t number(const Eigen::Vector3i& at) const {
+    const auto width = static_cast<std::size_t>(whole().x()), height = static_cast<std::size_t>(whole().y());
+    return static_cast<std::size_t>(at.x()) +
+           width * (static_cast<std::size_t>(at.y()) + height * static_cast<std::size_t>(at.z()));
+  }
   /// Of a cell of the whole grid [m].
   [[nodiscard]] std::array<double, 3> middle(const Eigen::Vector3i& at, double resolution) const {
     const Eigen::Vector3d x = origin + resolution * (at.cast<double>().array() + 0.5).matrix();
@@ -46,6 +54,38 @@ void for_each_cell(const Eigen::Vector3i& size, Visit&& visit) {
   for (at.z() = 0; at.z() < size.z(); ++at.z())
     for (at.y() = 0; at.y() < size.y(); ++at.y())
       for (at.x() = 0; at.x() < size.x(); ++at.x()) visit(at);
+}
+
+/// What is known of the middle of each cell of the whole grid.
+std::vector<SpaceState> states_of(const SurfaceVolume& volume, const FreeSpace& free, const Grid& grid,
+                                  double resolution) {
+  std::vector<SpaceState> states;
+  states.reserve(static_cast<std::size_t>(grid.whole().cast<std::int64_t>().prod()));
+  for_each_cell(grid.whole(), [&](const Eigen::Vector3i& at) {
+    states.push_back(space_point(volume, free, grid.middle(at, resolution)).state);
+  });
+  return states;
+}
+
+/// Where space that is known to be free ends without a surface: the middles of faces between free and unknown
+/// cells [cells of the whole grid].
+void add_frontier(const std::vector<SpaceState>& states, const Eigen::Vector3i& whole,
+                  std::vector<Eigen::Vector3f>& points) {
+  const std::array<std::size_t, 3> steps{
+      1, static_cast<std::size_t>(whole.x()),
+      static_cast<std::size_t>(whole.x()) * static_cast<std::size_t>(whole.y())};
+  std::size_t number = 0;
+  for_each_cell(whole, [&](const Eigen::Vector3i& at) {
+    const SpaceState here = states[number];
+    for (int axis = 0; axis < 3 && here != SpaceState::kOccupied; ++axis) {
+      if (at[axis] + 1 == whole[axis]) continue;
+      const SpaceState beside = states[number + steps[static_cast<std::size_t>(axis)]];
+      if (beside == SpaceState::kOccupied || beside == here) continue;
+      points.emplace_back(at.cast<float>().array() + 0.5F);
+      points.back()[axis] += 0.5F;
+    }
+    ++number;
+  });
 }
 
 /// Of the surface, so close that no cell that it passes through is without [cells of the whole grid].
@@ -110,25 +150,23 @@ SpacePoint space_point(const SurfaceVolume& volume, const FreeSpace& free,
 
 DistanceField distance_field(const SurfaceVolume& volume, const FreeSpace& free, const DistanceBox& box) {
   const Grid grid(box);
+  const std::vector<SpaceState> states = states_of(volume, free, grid, box.resolution);
   std::vector<Eigen::Vector3f> points = surface_points(volume, grid, box.resolution);
-  DistanceField field{box.min_corner, box.resolution, {grid.size.x(), grid.size.y(), grid.size.z()}, {}, {}};
-  const auto state_of = [&](const Eigen::Vector3i& at) {
-    return space_point(volume, free, grid.middle(at, box.resolution)).state;
-  };
-  const Eigen::Vector3i border = Eigen::Vector3i::Constant(grid.border);
-  for_each_cell(grid.size, [&](const Eigen::Vector3i& at) { field.states.push_back(state_of(at + border)); });
-  if (box.unknown_is_obstacle) {
-    for_each_cell(grid.whole(), [&](const Eigen::Vector3i& at) {
-      if (state_of(at) == SpaceState::kUnknown) points.emplace_back(at.cast<float>().array() + 0.5F);
-    });
-  }
+  if (box.unknown_is_obstacle) add_frontier(states, grid.whole(), points);
   const NearestPoints nearest(grid.whole(), points);
-  field.distances.reserve(field.states.size());
-  for_each_cell(grid.size, [&](const Eigen::Vector3i& at) {
+  DistanceField field{box.min_corner, box.resolution, {grid.size.x(), grid.size.y(), grid.size.z()}, {}, {}};
+  const std::size_t cells = static_cast<std::size_t>(grid.size.cast<std::int64_t>().prod());
+  field.states.reserve(cells);
+  field.distances.reserve(cells);
+  for_each_cell(grid.size, [&](const Eigen::Vector3i& in_box) {
+    const Eigen::Vector3i at = in_box.array() + grid.border;
+    const SpaceState state = states[grid.number(at)];
     const auto metres = static_cast<float>(
-        std::min(static_cast<double>(nearest.distance(at + border)) * box.resolution, box.max_distance));
-    const bool inside = field.states[field.distances.size()] == SpaceState::kOccupied;
-    field.distances.push_back(inside ? -metres : metres);
+        std::min(static_cast<double>(nearest.distance(at)) * box.resolution, box.max_distance));
+    const bool is_obstacle =
+        state == SpaceState::kOccupied || (state == SpaceState::kUnknown && box.unknown_is_obstacle);
+    field.states.push_back(state);
+    field.distances.push_back(is_obstacle ? -metres : metres);
   });
   return field;
 }

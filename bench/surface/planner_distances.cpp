@@ -58,7 +58,7 @@ class Errors {
 };
 
 DistanceField field_before(const SurfaceModel& model, const TriangleMesh& seen, double voxel) {
-  DistanceBox box{.resolution = 2 * voxel, .max_distance = kMaxDistance};
+  DistanceBox box{.resolution = 2 * voxel, .max_distance = kMaxDistance, .unknown_is_obstacle = false};
   for (int axis = 0; axis < 3; ++axis) {
     const auto [least, most] =
         std::minmax_element(seen.positions.begin(), seen.positions.end(),

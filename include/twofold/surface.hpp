@@ -40,9 +40,9 @@ struct SpacePoint {
   SpaceState state = SpaceState::kUnknown;
   /// From the surface [m], positive outside; truncated at four voxels or at three standard deviations of the
   /// depth, whichever is more, but never at more than 60 voxels. Free space away from surfaces: four voxels,
-  /// or less within a voxel of where distances are known. kUnknown: 0. Measured along the
-  /// cameras' rays and shortened by the slant: beside rims and in clutter a surface may be nearer
-  /// (SurfaceModel::distances has the nearest).
+  /// or less within a voxel of where distances are known. kUnknown: 0 (SurfaceModel::at; DistanceField::at
+  /// has its own). Measured along the cameras' rays and shortened by the slant: beside rims and in clutter a
+  /// surface may be nearer (SurfaceModel::distances has the nearest).
   double distance = 0;
   /// d distance / d position: away from the surface, up to what was said; its length is about 1. 0 in free
   /// space away from surfaces, and where unknown.
@@ -55,11 +55,13 @@ struct DistanceBox {
   std::array<double, 3> max_corner{0, 0, 0};  ///< [m], above min_corner in each axis
   double resolution = 0.1;                    ///< edge of a cell [m] > 0
   double max_distance = 1;                    ///< no distance is longer [m] > 0
-  bool unknown_is_obstacle = false;           ///< middles of unknown cells are taken for points of a surface
+  /// Unknown space is an obstacle, as behind a wall it mostly is: distances are to the nearest surface or to
+  /// where known free space ends. False: only surfaces count, and unknown space looks free.
+  bool unknown_is_obstacle = true;
 
   /// Empty when valid; otherwise names the field, the rule and the value. The box and what is within
-  /// max_distance of it have 2^26 cells at most, which take 0.5 GB while distances are found,
-  /// and up to 0.8 GB more where many are unknown and taken for obstacles.
+  /// max_distance of it have 2^26 cells at most, which take 0.6 GB while distances are found,
+  /// and 24 bytes for each face between a free and an unknown cell.
   [[nodiscard]] TWOFOLD_API std::string invalid_reason() const;
 };
 
@@ -69,13 +71,25 @@ struct DistanceField {
   std::array<double, 3> min_corner{0, 0, 0};  ///< of cell (0, 0, 0) [m]
   double resolution = 0;                      ///< edge of a cell [m]
   std::array<std::int32_t, 3> size{};         ///< cells along x, y, z
-  /// [m], negative inside a surface, max_distance at most; of unknown cells, to the nearest surface that is
-  /// known. Cell (i, j, k) is at i + size[0] * (j + size[1] * k), as in `states`.
+  /// [m], to the nearest surface; with DistanceBox::unknown_is_obstacle to that or the nearest face between a
+  /// free cell and an unknown one. Its absolute value is max_distance where none lies within that. The sign
+  /// is of the cell's state:
+  ///
+  ///               unknown_is_obstacle                     without
+  ///   kFree       positive                                positive
+  ///   kOccupied   negative                                negative
+  ///   kUnknown    negative: the way to free space         positive, also behind a wall, where it grows with
+  ///                                                       the depth: ask `states`
+  ///
+  /// So with it the sign changes once from free space into a wall, and the gradient leads out of it from as
+  /// deep as max_distance. A robot's own place, nearer than depth begins, is unknown unless it was looked at
+  /// before: take what the robot stands in for free yourself. Cell (i, j, k) is at i + size[0] * (j + size[1]
+  /// * k), as in `states`.
   std::vector<float> distances;
   std::vector<SpaceState> states;
 
-  /// Between the middles of cells, the gradient as well, linear in x, y and z; the state of the cell. Outside
-  /// of the box, and what is not finite, is unknown, with a distance of 0.
+  /// Distance and gradient, linear in x, y and z between the middles of cells, in unknown cells, too; the
+  /// state of the cell. Outside of the box, and what is not finite, is unknown, with a distance of 0.
   [[nodiscard]] TWOFOLD_API SpacePoint at(const std::array<double, 3>& p_world) const;
 };
 

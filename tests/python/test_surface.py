@@ -38,7 +38,10 @@ def test_a_model_tells_what_is_free_and_how_far_the_wall_is(rig: twofold.CameraR
     assert known["gradient"].shape == (4, 3)
     assert known["gradient"][1][2] == pytest.approx(-1, abs=0.1)
 
-    field = model.distances([-0.1, -0.2, 1.0], [0.1, 0.2, 1.9], resolution=0.1, max_distance=1)
+    box = ([-0.1, -0.2, 1.0], [0.1, 0.2, 1.9])
+    hidden = model.distances([-0.1, -0.1, 2.2], [0.1, 0.1, 2.4], resolution=0.1, max_distance=1)
+    assert (hidden.distances < -0.2).all(), "unknown space is an obstacle"
+    field = model.distances(*box, resolution=0.1, max_distance=1, unknown_is_obstacle=False)
     assert field.distances.shape == field.states.shape == (9, 4, 2)
     assert field.distances[0, 0, 0] == pytest.approx(0.95, abs=0.03)
     assert field.at(np.array([[0.0, 0, 1.55]]))["distance"][0] == pytest.approx(0.45, abs=0.03)

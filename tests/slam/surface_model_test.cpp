@@ -261,7 +261,8 @@ TEST(SurfaceModel, KnowsTheNearestSurfaceWhicheverWayItLies) {
   const DistanceField field = model.distances({.min_corner = {-0.5, -0.4, 1.1},
                                                .max_corner = {0.5, 0.4, 3.05},
                                                .resolution = 0.04,
-                                               .max_distance = 0.8});
+                                               .max_distance = 0.8,
+                                               .unknown_is_obstacle = false});
   EXPECT_EQ(field.size, (std::array<std::int32_t, 3>{25, 20, 49}));
   ASSERT_EQ(field.distances.size(), 25U * 20U * 49U);
   ASSERT_EQ(field.states.size(), field.distances.size());
@@ -285,7 +286,7 @@ TEST(SurfaceModel, KnowsTheNearestSurfaceWhicheverWayItLies) {
 }
 
 /// What was never seen may hold anything: behind the rim of a box, for one.
-TEST(SurfaceModel, TakesTheUnknownForAnObstacleWhereItIsAsked) {
+TEST(SurfaceModel, TakesTheUnknownForAnObstacleUnlessItIsToldOtherwise) {
   WallFrame frame = far_wall();
   draw_box(frame, 0, 80, 0, kHeight, 1500);
   SurfaceModel model(depth_camera(), {.voxel_size = 0.02});
@@ -295,19 +296,65 @@ TEST(SurfaceModel, TakesTheUnknownForAnObstacleWhereItIsAsked) {
                   .resolution = 0.04,
                   .max_distance = 0.5};
   const std::array<double, 3> beside{0.3, 0, 2.2};
-  EXPECT_NEAR(model.distances(box).at(beside).distance, 0.5, 0.01);
-  box.unknown_is_obstacle = true;
   const SpacePoint point = model.distances(box).at(beside);
   EXPECT_EQ(point.state, SpaceState::kFree);
   EXPECT_LT(point.distance, 0.3);  // behind the box, on its left
+  EXPECT_GT(point.distance, 0.1);
   EXPECT_GT(point.gradient[0], 0.5);
+  const std::array<double, 3> hidden{-0.1, 0, 2.2};
+  EXPECT_EQ(model.distances(box).at(hidden).state, SpaceState::kUnknown);
+  EXPECT_LT(model.distances(box).at(hidden).distance, -0.05);
+  EXPECT_GT(model.distances(box).at(hidden).gradient[0], 0.5) << "out to free space";
+  box.unknown_is_obstacle = false;
+  EXPECT_NEAR(model.distances(box).at(beside).distance, 0.5, 0.01);
+  EXPECT_GT(model.distances(box).at(hidden).distance, 0.1);
+}
+
+/// Along the way into a thing whose front is `front` away, through its truncation band (8 cm) and beyond.
+void expect_signed_distances(const SurfaceModel& model, double front) {
+  DistanceBox box{.min_corner = {-0.1, -0.1, front - 0.5},
+                  .max_corner = {0.1, 0.1, front + 0.4},
+                  .resolution = 0.04,
+                  .max_distance = 0.3};
+  const DistanceField field = model.distances(box);
+  for (double z = -0.4; z < 0.35; z += 0.02) {
+    const SpacePoint point = field.at({0, 0, front + z});
+    EXPECT_NEAR(point.distance, std::clamp(-z, -0.3, 0.3), 0.02) << z << " m behind the front";
+    if (std::abs(z) < 0.02 || std::abs(z) > 0.24) continue;  // kinks at the surface's cell and at the end
+    EXPECT_NEAR(point.gradient[2], -1, 0.2) << z << " m behind the front";
+    if (z < 0) EXPECT_EQ(point.state, SpaceState::kFree) << z;
+    if (z > 0 && z < 0.06) EXPECT_EQ(point.state, SpaceState::kOccupied) << z;
+    if (z > 0.12) EXPECT_EQ(point.state, SpaceState::kUnknown) << z;
+  }
+  box.unknown_is_obstacle = false;
+  const DistanceField surfaces = model.distances(box);
+  EXPECT_NEAR(surfaces.at({0, 0, front - 0.2}).distance, 0.2, 0.02);
+  EXPECT_NEAR(surfaces.at({0, 0, front + 0.04}).distance, -0.04, 0.02);
+  EXPECT_NEAR(surfaces.at({0, 0, front + 0.2}).distance, 0.2, 0.02) << "unknown looks free";
+  EXPECT_NEAR(surfaces.at({0, 0, front + 0.2}).gradient[2], 1, 0.2);
+}
+
+TEST(SurfaceModel, DistancesFallFromFreeSpaceDeepIntoAWall) {
+  SurfaceModel model(depth_camera(), {.voxel_size = 0.02});
+  for (int n = 0; n < 3; ++n) ASSERT_GT(model.add(far_wall().view(), {}), 0);
+  expect_signed_distances(model, 3);
+}
+
+TEST(SurfaceModel, DistancesFallFromFreeSpaceDeepIntoAThickBox) {
+  WallFrame frame = far_wall();
+  draw_box(frame, 30, 130, 10, 110, 1500);
+  SurfaceModel model(depth_camera(), {.voxel_size = 0.02});
+  for (int n = 0; n < 3; ++n) ASSERT_GT(model.add(frame.view(), {}), 0);
+  expect_signed_distances(model, 1.5);
 }
 
 TEST(SurfaceModel, SaysWhichBoxesHaveNoDistances) {
   const SurfaceModel model(depth_camera(), {.voxel_size = 0.02});
   const DistanceBox valid{.min_corner = {0, 0, 0}, .max_corner = {1, 1, 1}};
   EXPECT_EQ(valid.invalid_reason(), "");
-  for (const float distance : model.distances(valid).distances) EXPECT_EQ(distance, 1);  // of nothing at all
+  for (const float distance : model.distances(valid).distances) EXPECT_EQ(distance, -1);  // of nothing at all
+  const DistanceBox optimistic{.max_corner = {1, 1, 1}, .unknown_is_obstacle = false};
+  for (const float distance : model.distances(optimistic).distances) EXPECT_EQ(distance, 1);
   const auto refused = [&](DistanceBox box, const char* why) {
     EXPECT_NE(box.invalid_reason().find(why), std::string::npos) << box.invalid_reason();
     EXPECT_THROW(static_cast<void>(model.distances(box)), std::invalid_argument) << why;
