@@ -16,7 +16,7 @@ import twofold
 
 def main(name: str = "synthetic:desk?sensor=rgbd&frames=60&width=320&height=240", mesh: str = "") -> None:
     source = twofold.Source(name)
-    here = twofold.Pose()
+    last = None
     with twofold.Slam(source.rig, mode=twofold.RunMode.DETERMINISTIC) as slam:
         surface = twofold.MapSurface(slam.map(), voxel_size=0.02)
         for frame in source:
@@ -24,11 +24,12 @@ def main(name: str = "synthetic:desk?sensor=rgbd&frames=60&width=320&height=240"
             pose = slam.latest()
             if pose is None or not pose.tracked:
                 continue
-            here = pose.T_world_camera
+            last = pose
             if pose.keyframe:
                 surface.add(frame, pose.frame)
                 surface.update(slam.map())
     now = surface.snapshot()  # for any thread, however long; the surface goes on without it
+    here = (last and now.pose_of(last)) or twofold.Pose()  # in the snapshot's world
     metres = np.arange(0, 3, 0.01)
     ahead = now.at(np.array([here @ np.array([0, 0, z]) for z in metres]))
     free = metres[ahead["state"] == twofold.SpaceState.FREE.value]

@@ -2,6 +2,7 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <mutex>
+#include <optional>
 #include <shared_mutex>
 
 #include <fmt/format.h>
@@ -240,6 +241,16 @@ void bind_map_surface(py::module_& module) {
       .def_property_readonly(
           "map_part", [](const SurfaceSnapshot& self) { return known_id(self.map_part()); },
           "Whose world positions are in; None: of nothing.");
+  snapshot.def(
+      "pose_of",
+      [](const SurfaceSnapshot& self, const PoseEstimate& pose, const MapRows* map) {
+        return self.pose_of(pose, map != nullptr ? map->snapshot : MapSnapshot());
+      },
+      py::arg("pose"), py::arg("map") = nullptr,
+      "T_world_camera of a tracked frame in the world that this surface is in, which a correction of the map "
+      "may have moved\nagainst the pose's. map: newer than both (Slam.map()), for reference keyframes that "
+      "the "
+      "snapshot does not have yet. None\nwhere that is not known, or another map part.");
   bind_questions(snapshot, [](const SurfaceSnapshot& self, const auto& question) { return question(self); });
   py::class_<SurfaceUpdate>(module, "SurfaceUpdate",
                             "What MapSurface.update did, and what was left out since the update before.")
@@ -294,8 +305,13 @@ void bind_map_surface(py::module_& module) {
           "and "
           "what was left out.")
       .def(
-          "snapshot", [](const OfMap& self) { return self.surface.snapshot(); },
-          "As of the end of the last update: a SurfaceSnapshot. Waits for no update.")
+          "snapshot",
+          [](const OfMap& self, const std::optional<std::uint32_t>& part) {
+            return part ? self.surface.snapshot(*part) : self.surface.snapshot();
+          },
+          py::arg("part") = py::none(),
+          "As of the end of the last update: a SurfaceSnapshot, of the map part that the camera is in, or of "
+          "another one\n(PoseEstimate.map_part). Waits for no update.")
       .def(
           "memory_bytes", [](const OfMap& self) { return self.surface.memory_bytes(); },
           "Of samples and depth images, at the end of the last call of add or update.");

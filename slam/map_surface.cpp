@@ -1,10 +1,13 @@
+#include <algorithm>
 #include <atomic>
+#include <iterator>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 
 #include "base/option_check.hpp"
+#include "slam/conversions.hpp"
 #include "slam/depth_frame.hpp"
 #include "slam/distance_field.hpp"
 #include "slam/map_snapshot.hpp"
@@ -34,9 +37,9 @@ struct SurfaceSnapshot::Impl {
     FreeSpace free;
   };
 
-  Impl(const SurfaceOptions& its_options, std::vector<SharedSubmap> its_submaps, std::uint64_t its_version,
-       std::uint32_t its_part)
-      : options(its_options), submaps(std::move(its_submaps)), version(its_version), part(its_part) {}
+  Impl(const SurfaceOptions& its_options, std::vector<SharedSubmap> its_submaps,
+       std::shared_ptr<const MapVersion> its_map, KeyframeId its_part)
+      : options(its_options), submaps(std::move(its_submaps)), map(std::move(its_map)), part(its_part) {}
 
   [[nodiscard]] const Joined& joined() const {
     const std::scoped_lock lock(mutex);
@@ -54,14 +57,50 @@ struct SurfaceSnapshot::Impl {
 
   const SurfaceOptions options;
   const std::vector<SharedSubmap> submaps;
-  const std::uint64_t version;
-  const std::uint32_t part;
+  const std::shared_ptr<const MapVersion> map;
+  const KeyframeId part;
 
  private:
   mutable std::mutex mutex;  // guards joined_ until it is there; then it does not change
   mutable std::optional<Joined> joined_;
   mutable std::atomic<std::size_t> joined_bytes_{0};
 };
+
+namespace {
+
+/// A keyframe of `older` to say where one of `newer` would be: the one that shares most points with it, else
+/// the newest. None of other parts, or culled since.
+std::optional<KeyframeId> keyframe_beside(const GraphSnapshot& older, const GraphSnapshot& newer,
+                                          KeyframeId id, KeyframeId part) {
+  const KeyframeId newer_part = newer.part(id);
+  const auto is_in_both = [&](KeyframeId other) {
+    return older.contains(other) && newer.contains(other) && !newer.keyframe(other).culled() &&
+           newer.part(other) == newer_part && older.part(other) == part;
+  };
+  const Edge* best = nullptr;
+  for (const Edge& edge : *newer.keyframe(id).edges)
+    if (is_in_both(edge.other) && (best == nullptr || edge.weight > best->weight)) best = &edge;
+  if (best != nullptr) return best->other;
+  for (std::size_t n = older.keyframe_count(); n-- > 0;)
+    if (const KeyframeId other{static_cast<std::uint32_t>(n)}; is_in_both(other)) return other;
+  return std::nullopt;
+}
+
+/// T_k_w of a keyframe in the world that a part of `older` had, also of one that only `newer` has. Nothing
+/// where it cannot be known.
+std::optional<SE3> pose_in_older(const GraphSnapshot& older, const GraphSnapshot& newer, KeyframeId id,
+                                 KeyframeId part) {
+  if (older.contains(id)) return older.part(id) == part ? std::optional(older.T_k_w(id)) : std::nullopt;
+  if (!newer.contains(id)) return std::nullopt;
+  const auto live = newer.live_replacement(id);
+  if (!live) return std::nullopt;
+  const auto beside = keyframe_beside(older, newer, live->id, part);
+  if (!beside) return std::nullopt;
+  const SE3 T_k_beside = newer.T_k_w(id) * newer.T_k_w(*beside).inverse();
+  return T_k_beside * older.T_k_w(*beside);
+}
+
+}  // namespace
 
 SurfaceSnapshot::SurfaceSnapshot() = default;
 SurfaceSnapshot::SurfaceSnapshot(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
@@ -70,11 +109,19 @@ SurfaceSnapshot::SurfaceSnapshot(const SurfaceSnapshot&) = default;
 SurfaceSnapshot& SurfaceSnapshot::operator=(const SurfaceSnapshot&) = default;
 
 std::uint64_t SurfaceSnapshot::map_version() const {
-  return impl_ ? impl_->version : 0;
+  return impl_ ? impl_->map->graph.version() : 0;
 }
 
 std::uint32_t SurfaceSnapshot::map_part() const {
-  return impl_ ? impl_->part : kNoId;
+  return impl_ ? index(impl_->part) : kNoId;
+}
+
+std::optional<Pose> SurfaceSnapshot::pose_of(const PoseEstimate& pose, const MapSnapshot& map) const {
+  if (!impl_ || pose.state != TrackingState::kTracked) return std::nullopt;
+  const KeyframeId reference{pose.reference_keyframe};
+  const auto T_k_w = pose_in_older(impl_->map->graph, map.impl_->map->graph, reference, impl_->part);
+  if (!T_k_w) return std::nullopt;
+  return to_pose(T_k_w->inverse() * to_se3(pose.T_reference_camera));
 }
 
 SpacePoint SurfaceSnapshot::at(const std::array<double, 3>& p_world) const {
@@ -114,7 +161,7 @@ struct MapSurface::Impl {
   std::shared_ptr<const std::atomic<double>> row_offset;  ///< of the run; null: of none
   double min_stereo_depth;
   SurfaceOptions options;
-  void publish(KeyframeId part);
+  void publish(const std::shared_ptr<const MapVersion>& map);
   /// What has been counted since the last call.
   [[nodiscard]] SurfaceUpdate take_counts();
 
@@ -124,17 +171,27 @@ struct MapSurface::Impl {
   std::uint64_t version = 0;
   std::atomic<std::size_t> bytes{0};
 
-  std::mutex mutex;  // guards `published`, while a pointer is copied or exchanged
-  std::shared_ptr<const SurfaceSnapshot::Impl> published;
+  using OfPart = std::shared_ptr<const SurfaceSnapshot::Impl>;
+  std::mutex mutex;               // guards what follows, while a pointer is copied or a list exchanged
+  std::vector<OfPart> published;  ///< of each map part, first that of the camera
 };
 
-void MapSurface::Impl::publish(KeyframeId part) {
-  std::vector<SharedSubmap> of_part = submaps.share();
-  std::erase_if(of_part, [&](const SharedSubmap& submap) { return submap.part != part; });
-  auto next =
-      std::make_shared<const SurfaceSnapshot::Impl>(options, std::move(of_part), version, index(part));
+void MapSurface::Impl::publish(const std::shared_ptr<const MapVersion>& map) {
+  const GraphSnapshot& graph = map->graph;
+  if (graph.reference() == kNoKeyframe) return;
+  std::vector<SharedSubmap> rest = submaps.share();
+  std::vector<OfPart> next;
+  for (KeyframeId part = graph.part(graph.reference());; part = rest.front().part) {
+    std::vector<SharedSubmap> of_part;
+    const auto end = std::stable_partition(rest.begin(), rest.end(),
+                                           [&](const SharedSubmap& submap) { return submap.part != part; });
+    std::move(end, rest.end(), std::back_inserter(of_part));
+    rest.erase(end, rest.end());
+    next.push_back(std::make_shared<const SurfaceSnapshot::Impl>(options, std::move(of_part), map, part));
+    if (rest.empty()) break;
+  }
   const std::scoped_lock lock(mutex);
-  published.swap(next);  // the one before, if nobody else has it, is destroyed after the lock
+  published.swap(next);  // those before, if nobody else has them, are destroyed after the lock
 }
 
 SurfaceUpdate MapSurface::Impl::take_counts() {
@@ -192,13 +249,20 @@ SurfaceUpdate MapSurface::update(const MapSnapshot& map) {
   impl_->submaps.step(graph);
   impl_->version = graph.version();
   impl_->bytes = impl_->submaps.bytes();
-  if (graph.reference() != kNoKeyframe) impl_->publish(graph.part(graph.reference()));
+  impl_->publish(map.impl_->map);
   return impl_->take_counts();
 }
 
 SurfaceSnapshot MapSurface::snapshot() const {
   const std::scoped_lock lock(impl_->mutex);
-  return SurfaceSnapshot(impl_->published);
+  return impl_->published.empty() ? SurfaceSnapshot() : SurfaceSnapshot(impl_->published.front());
+}
+
+SurfaceSnapshot MapSurface::snapshot(std::uint32_t part) const {
+  const std::scoped_lock lock(impl_->mutex);
+  for (const Impl::OfPart& published : impl_->published)
+    if (index(published->part) == part) return SurfaceSnapshot(published);
+  return {};
 }
 
 std::size_t MapSurface::memory_bytes() const {

@@ -137,6 +137,7 @@ class TWOFOLD_API MapSnapshot {
 
  private:
   friend class MapSurface;
+  friend class SurfaceSnapshot;
   std::shared_ptr<const Impl> impl_;
 };
 

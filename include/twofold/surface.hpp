@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -192,8 +193,9 @@ struct MapSurfaceOptions {
 };
 
 /// The surface of a run as it was in one version of its map: it does not change any more. Copies are of the
-/// same one. Any thread, several at once. The first question joins what the surface has in submaps, on the
-/// thread that asks, which takes about 20 us for a block of 8^3 samples; the others are SurfaceModel's.
+/// same one, and it keeps that version of the map (MapSnapshot). Any thread, several at once. The first
+/// question joins what the surface has in submaps, on the thread that asks, which takes about 20 us for a
+/// block of 8^3 samples; the others are SurfaceModel's.
 class TWOFOLD_API SurfaceSnapshot {
  public:
   SurfaceSnapshot();  ///< of nothing
@@ -205,6 +207,15 @@ class TWOFOLD_API SurfaceSnapshot {
   [[nodiscard]] std::uint64_t map_version() const;
   /// Whose world positions are in; kNoId: none.
   [[nodiscard]] std::uint32_t map_part() const;
+  /// T_world_camera of a tracked frame in the world that this surface is in, which a correction of the map
+  /// may have moved against the pose's: by its reference keyframe and T_reference_camera. Ask for what is
+  /// ahead of the camera with this pose, not with PoseEstimate::T_world_camera.
+  /// @param map  of the same run, newer than the snapshot and than the frame (Slam::map): through it a
+  ///             reference keyframe is found that the snapshot does not have yet, by the keyframe that shares
+  ///             most points with it, else by the snapshot's newest
+  /// @return  nothing where the frame is lost, in another map part, or its keyframe is in neither map, or was
+  ///          culled so long ago that what replaced it is forgotten. O(keyframes beside it).
+  [[nodiscard]] std::optional<Pose> pose_of(const PoseEstimate& pose, const MapSnapshot& map = {}) const;
   /// As SurfaceModel::at.
   [[nodiscard]] SpacePoint at(const std::array<double, 3>& p_world) const;
   /// As SurfaceModel::distances.
@@ -280,6 +291,10 @@ class TWOFOLD_API MapSurface {
   /// As of the end of the last update, of the map part in which the camera was then; of nothing before the
   /// first. O(1).
   [[nodiscard]] SurfaceSnapshot snapshot() const;
+  /// The same of another map part: after a loss the camera mostly begins a new one, until the two are joined.
+  /// Of nothing where the map has no such part.
+  /// @param part  PoseEstimate::map_part
+  [[nodiscard]] SurfaceSnapshot snapshot(std::uint32_t part) const;
   /// Of samples and depth images, at the end of the last call of add or update. While an update lasts, and as
   /// long as older snapshots are held, what it changes is there twice.
   [[nodiscard]] std::size_t memory_bytes() const;

@@ -116,6 +116,81 @@ TEST_F(MapSurfaceTest, ReportsFramesThatAreNoKeyframesAndKeyframesBeyondItsMemor
   EXPECT_EQ(update.discarded, pose_->frame + 1 - keyframes);
 }
 
+void expect_near(const Pose& a, const Pose& b, double metres) {
+  const Pose between = compose(inverse(a), b);
+  EXPECT_LT(std::hypot(between.t[0], between.t[1], between.t[2]), metres);
+  EXPECT_LT(std::hypot(between.q[0], between.q[1], between.q[2]), metres);
+}
+
+const MapSnapshot::Keyframe& keyframe_of(const std::vector<MapSnapshot::Keyframe>& keyframes,
+                                         std::uint32_t id) {
+  return *std::find_if(keyframes.begin(), keyframes.end(), [&](const auto& k) { return k.id == id; });
+}
+
+/// After a correction the map of before and its surface still belong together.
+TEST_F(MapSurfaceTest, ASnapshotSaysWhereTheCameraIsInItsOwnWorld) {
+  add_keyframes(3);
+  const SurfaceSnapshot early = surface_.snapshot();
+  const MapSnapshot early_map = slam_.map();
+  const PoseEstimate early_pose = *pose_;
+  const auto early_keyframes = early_map.keyframes();
+  const Pose expected = compose(keyframe_of(early_keyframes, early_pose.reference_keyframe).T_world_camera,
+                                early_pose.T_reference_camera);
+  ASSERT_TRUE(early.pose_of(early_pose));
+  expect_near(*early.pose_of(early_pose), expected, 1e-9);
+
+  add_keyframes(1000);
+  ASSERT_GT(pose_->reference_keyframe, early_keyframes.back().id);
+  EXPECT_FALSE(early.pose_of(*pose_)) << "a keyframe that it does not know";
+  const auto now = early.pose_of(*pose_, slam_.map());
+  ASSERT_TRUE(now);
+  expect_near(*now, pose_->T_world_camera, 0.03);
+  EXPECT_EQ(early.pose_of(early_pose, slam_.map()), early.pose_of(early_pose));
+
+  PoseEstimate lost = *pose_;
+  lost.state = TrackingState::kLost;
+  EXPECT_FALSE(early.pose_of(lost, slam_.map()));
+  EXPECT_FALSE(SurfaceSnapshot().pose_of(*pose_, slam_.map()));
+  PoseEstimate unknown = *pose_;
+  unknown.reference_keyframe = 1'000'000;
+  EXPECT_FALSE(early.pose_of(unknown, slam_.map()));
+}
+
+/// The lens is covered for a while; places are not recognised, so that what comes then is another part.
+TEST(MapSurface, HasSnapshotsOfEveryMapPart) {
+  Source source("synthetic:desk?sensor=rgbd&width=160&height=120&rounds=1&frames=160");
+  Slam slam(source.rig(), {.mode = RunMode::kDeterministic, .places = false});
+  MapSurface surface(slam.map(), {.model = {.voxel_size = 0.03}});
+  const std::vector<std::uint8_t> black(2 * 160 * 120);
+  std::optional<PoseEstimate> first, pose;
+  int number = 0;
+  for (FrameView frame; source.next(frame); ++number) {
+    if (number >= 40 && number < 100) {
+      frame.left.data = frame.depth.data = black.data();
+      frame.left.stride = 160;
+      frame.depth.stride = 320;
+      frame.owner = nullptr;
+    }
+    slam.push(frame);
+    pose = slam.latest();
+    if (number == 30) first = pose;
+    if (pose && pose->keyframe) surface.add(frame, pose->frame);
+  }
+  surface.update(slam.map());
+  ASSERT_EQ(pose->state, TrackingState::kTracked);
+  ASSERT_NE(pose->map_part, first->map_part);
+  EXPECT_EQ(surface.snapshot().map_part(), pose->map_part);
+  EXPECT_EQ(surface.snapshot(pose->map_part).mesh().positions, surface.snapshot().mesh().positions);
+  const SurfaceSnapshot before = surface.snapshot(first->map_part);
+  EXPECT_EQ(before.map_part(), first->map_part);
+  EXPECT_EQ(before.map_version(), surface.snapshot().map_version());
+  EXPECT_GT(before.mesh().triangles.size(), 500U);
+  EXPECT_NE(before.mesh().positions, surface.snapshot().mesh().positions);
+  EXPECT_EQ(surface.snapshot(12345).map_part(), kNoId);
+  EXPECT_TRUE(before.pose_of(*first, slam.map()));
+  EXPECT_FALSE(before.pose_of(*pose, slam.map())) << "in another part";
+}
+
 TEST_F(MapSurfaceTest, SaysWhatIsWrong) {
   add_keyframes(1);
   const MapSnapshot early = slam_.map();
