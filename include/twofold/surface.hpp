@@ -266,7 +266,8 @@ struct SurfaceUpdate {
 /// which costs memory.
 class TWOFOLD_API MapSurface {
  public:
-  /// @param map  of the run, before its first keyframe: it tells the rig, and what comes of a loaded map
+  /// @param map  of the run, before its first keyframe: it tells the rig, and which keyframes are a loaded
+  ///             map's, of which there are no images and no surface. Later: earlier keyframes are missing
   /// Throws std::invalid_argument as SurfaceModel does.
   explicit MapSurface(const MapSnapshot& map, const MapSurfaceOptions& options = {});
   ~MapSurface();
