@@ -233,14 +233,17 @@ void bind_model(py::module_& module) {
 void bind_map_surface(py::module_& module) {
   py::class_<SurfaceSnapshot> snapshot(
       module, "SurfaceSnapshot",
-      "The surface of a run as it was in one version of its map: it does not change any more. The first "
-      "question joins what\nthe surface has in submaps, which takes a while.");
+      "The surface of a run as it was in one version of its map: it does not change any more. Before the "
+      "first question is\nanswered its submaps are joined, which takes about 0.2 s for 100 MB: prepare() "
+      "does that on another thread.");
   snapshot
       .def_property_readonly("map_version", &SurfaceSnapshot::map_version,
                              "Of the map that it fits; 0: of nothing.")
       .def_property_readonly(
           "map_part", [](const SurfaceSnapshot& self) { return known_id(self.map_part()); },
           "Whose world positions are in; None: of nothing.");
+  snapshot.def("prepare", &SurfaceSnapshot::prepare, py::call_guard<py::gil_scoped_release>(),
+               "Joins the submaps now, unless that was done.");
   snapshot.def(
       "pose_of",
       [](const SurfaceSnapshot& self, const PoseEstimate& pose, const MapRows* map) {

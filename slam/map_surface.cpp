@@ -42,17 +42,17 @@ struct SurfaceSnapshot::Impl {
       : options(its_options), submaps(std::move(its_submaps)), map(std::move(its_map)), part(its_part) {}
 
   [[nodiscard]] const Joined& joined() const {
-    const std::scoped_lock lock(mutex);
-    if (!joined_) {
-      joined_.emplace(options, submaps);
-      joined_bytes_ = joined_->volume.bytes() + joined_->free.bytes();
-    }
+    if (const Joined* there = ready_.load(std::memory_order_acquire)) return *there;
+    const std::scoped_lock lock(mutex_);
+    if (!joined_) joined_.emplace(options, submaps);
+    ready_.store(&*joined_, std::memory_order_release);
     return *joined_;
   }
   [[nodiscard]] std::size_t bytes() const {
-    std::size_t sum = sizeof(Impl) + joined_bytes_;
+    std::size_t sum = sizeof(Impl);
     for (const SharedSubmap& submap : submaps) sum += submap.volume->bytes() + submap.free->bytes();
-    return sum;
+    const Joined* there = ready_.load(std::memory_order_acquire);
+    return there != nullptr ? sum + there->volume.bytes() + there->free.bytes() : sum;
   }
 
   const SurfaceOptions options;
@@ -61,9 +61,9 @@ struct SurfaceSnapshot::Impl {
   const KeyframeId part;
 
  private:
-  mutable std::mutex mutex;  // guards joined_ until it is there; then it does not change
+  mutable std::mutex mutex_;  // guards joined_ until it is there; then it does not change
   mutable std::optional<Joined> joined_;
-  mutable std::atomic<std::size_t> joined_bytes_{0};
+  mutable std::atomic<const Joined*> ready_{nullptr};  // joined_, whose making this publishes
 };
 
 namespace {
@@ -122,6 +122,10 @@ std::optional<Pose> SurfaceSnapshot::pose_of(const PoseEstimate& pose, const Map
   const auto T_k_w = pose_in_older(impl_->map->graph, map.impl_->map->graph, reference, impl_->part);
   if (!T_k_w) return std::nullopt;
   return to_pose(T_k_w->inverse() * to_se3(pose.T_reference_camera));
+}
+
+void SurfaceSnapshot::prepare() const {
+  if (impl_) (void)impl_->joined();
 }
 
 SpacePoint SurfaceSnapshot::at(const std::array<double, 3>& p_world) const {

@@ -1,8 +1,8 @@
 // What the surface of a run costs its own thread, and how long a planner waits:  planner_questions SOURCE
 // [VOXEL]
 //
-// A deterministic run; after each keyframe MapSurface::update, and every tenth keyframe a new snapshot, asked
-// for one position, for that again, and for a box of 2 m around the camera.
+// A deterministic run; after each keyframe MapSurface::update, and every tenth keyframe a new snapshot,
+// which is prepared, and then asked for a position and for a box of 2 m around the camera.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -47,12 +47,11 @@ class Times {
 
 class Planner {
  public:
-  void ask(MapSurface& surface, const Pose& T_world_camera) {
+  void ask(const MapSurface& surface, const Pose& T_world_camera) {
     const std::array<double, 3> ahead = transform(T_world_camera, {0, 0, 1});
     const SurfaceSnapshot now = taken_.of([&] { return surface.snapshot(); });
-    const SpacePoint first = first_.of([&] { return now.at(ahead); });
-    const SpacePoint again = again_.of([&] { return now.at(ahead); });
-    free_ += first.state == SpaceState::kFree && again.state == SpaceState::kFree;
+    prepared_.of([&] { return now.prepare(), 0; });
+    free_ += at_.of([&] { return now.at(ahead); }).state == SpaceState::kFree;
     DistanceBox box{.resolution = 0.05};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       box.min_corner[axis] = T_world_camera.t[axis] - 1;
@@ -63,15 +62,15 @@ class Planner {
   }
   void print() {
     taken_.print("snapshot()");
-    first_.print("its first position");
-    again_.print("the second");
+    prepared_.print("prepare()");
+    at_.print("a position");
     box_.print("a box of 80^3 cells");
     std::printf("a metre ahead is free %d times; the last snapshot keeps %.1f MB\n", free_,
                 static_cast<double>(bytes_) / kMegabyte);
   }
 
  private:
-  Times taken_, first_, again_, box_;
+  Times taken_, prepared_, at_, box_;
   int free_ = 0;
   std::size_t bytes_ = 0;
 };

@@ -109,6 +109,9 @@ def test_a_runs_surface_follows_its_map() -> None:
         ahead = [pose.T_world_camera @ np.array([0, 0, z]) for z in np.arange(0.5, 4, 0.05)]
         assert (now.at(ahead)["state"] == twofold.SpaceState.FREE.value).sum() > 5
         assert now.memory_bytes() > 0 and surface.memory_bytes() > 0
+        before = surface.snapshot().memory_bytes()
+        surface.snapshot().prepare()
+        assert surface.snapshot().memory_bytes() >= before
         here = now.pose_of(pose)
         assert here is not None and np.abs(here.t - pose.T_world_camera.t).max() < 0.02
         assert early.pose_of(pose) is None, "its keyframe is newer"

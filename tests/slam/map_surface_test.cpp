@@ -77,6 +77,18 @@ TEST_F(MapSurfaceTest, AnswersWhatIsFreeAndWhereTheNextSurfaceIs) {
   EXPECT_GT(now.memory_bytes(), 100'000U);
 }
 
+TEST_F(MapSurfaceTest, ASnapshotIsPreparedOnceForAllCopies) {
+  SurfaceSnapshot().prepare();
+  add_keyframes(2);
+  const SurfaceSnapshot prepared = surface_.snapshot(), copy = surface_.snapshot();
+  const std::size_t bytes = prepared.memory_bytes();
+  prepared.prepare();
+  const std::size_t joined = copy.memory_bytes();
+  EXPECT_GT(joined, bytes + bytes / 4);
+  EXPECT_EQ(copy.at(ahead(0.4)).state, SpaceState::kFree);
+  EXPECT_EQ(copy.memory_bytes(), joined) << "the question has joined nothing";
+}
+
 TEST_F(MapSurfaceTest, ASnapshotStaysAsItWas) {
   add_keyframes(2);
   const SurfaceSnapshot early = surface_.snapshot();
