@@ -165,7 +165,7 @@ TEST_F(SubmapSurfaceTest, WhatIsSharedStaysAsItIs) {
     add_keyframe(surface);
     surface.step(writer_.publish());
   }
-  const std::vector<SharedSubmap> shared = surface.share(KeyframeId{0});
+  const std::vector<SharedSubmap> shared = surface.share();
   ASSERT_EQ(shared.size(), 2u);
   EXPECT_EQ(shared[0].volume.get(), surface.placed(KeyframeId{0})[0].volume)
       << "copied, though nobody changes it";
