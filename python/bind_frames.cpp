@@ -109,6 +109,17 @@ void bind_source(py::module_& module) {
           "Trajectory of the rig's camera; empty when there is none.")
       .def("next", &next_frame,
            "The next frame, or None at the end. Any thread: those that ask at once take turns.")
+      .def(
+          "in_colour",
+          [](const Source& self, const PythonFrame& frame) {
+            const py::gil_scoped_release unlocked;
+            return PythonFrame{self.in_colour(frame.view), {}};
+          },
+          py::arg("frame"),
+          "A frame that this source gave, with its left image in colour (blue, green, red) if the recording "
+          "has "
+          "it, else as it is:\nfor SurfaceModel.add and MapSurface.add. Decoded when it is asked for. Raises "
+          "RuntimeError when the input breaks.")
       .def("stop", &Source::stop, "A camera ends; of recordings, no more frames are given. From any thread.")
       .def("__iter__", [](const py::object& self) { return self; })
       .def("__next__",
@@ -150,7 +161,15 @@ void bind_rectifier(py::module_& module) {
             return PythonFrame{self.rectify(raw.view), {}};
           },
           py::arg("raw"),
-          "Grey images, and depth. Raises ValueError when the frame is not of the calibrated cameras.");
+          "Grey images, and depth. Raises ValueError when the frame is not of the calibrated cameras.")
+      .def(
+          "rectify_in_colour",
+          [](const FrameRectifier& self, const PythonFrame& raw) {
+            const py::gil_scoped_release unlocked;
+            return PythonFrame{self.rectify_in_colour(raw.view), {}};
+          },
+          py::arg("raw"),
+          "The same, with the left image in colour (blue, green, red) if `raw` has it so: for surfaces.");
 }
 
 }  // namespace

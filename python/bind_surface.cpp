@@ -187,6 +187,24 @@ SurfaceModelOptions model_options(double voxel_size, double max_depth, double ma
   return {voxel_size, max_depth, max_free_depth, min_stereo_depth};
 }
 
+void bind_changes(py::module_& module) {
+  py::class_<SurfacePiece>(module, "SurfacePiece", "The part of a mesh that lies in one cell of a grid.")
+      .def_readonly("cell", &SurfacePiece::cell, "Its lowest corner (3,), in cells.")
+      .def_readonly("mesh", &SurfacePiece::mesh, "Without triangles: nothing is there any more.");
+  py::class_<SurfaceChanges>(module, "SurfaceChanges", "What changed in a mesh since a revision.")
+      .def_readonly("revision", &SurfaceChanges::revision, "That it leads to.")
+      .def_readonly("cell_size", &SurfaceChanges::cell_size, "Edge of a cell [m].")
+      .def_property_readonly(
+          "pieces",
+          [](const py::object& self) {
+            py::list pieces;
+            for (const SurfacePiece& piece : self.cast<const SurfaceChanges&>().pieces)
+              pieces.append(py::cast(&piece, py::return_value_policy::reference_internal, self));
+            return pieces;
+          },
+          "SurfacePieces, which replace what was there.");
+}
+
 void bind_model(py::module_& module) {
   py::class_<Model> model(module, "SurfaceModel",
                           "A dense surface from frames with poses, for planners and models: a truncated "
@@ -223,7 +241,18 @@ void bind_model(py::module_& module) {
             const std::unique_lock lock(self.mutex);
             self.surface.clear();
           },
-          "Forgets all.");
+          "Forgets all.")
+      .def(
+          "mesh_changes",
+          [](Model& self, std::uint64_t since) {
+            const py::gil_scoped_release unlocked;
+            const std::unique_lock lock(self.mutex);
+            return self.surface.mesh_changes(since);
+          },
+          py::arg("since") = 0,
+          "What changed in the mesh after that revision, as SurfaceChanges; of 0 on, all of it. Only cells "
+          "that "
+          "frames changed are\nmade anew. Small specks, which `mesh` leaves out, are there.");
   bind_questions(model, [](const Model& self, const auto& question) {
     const std::shared_lock lock(self.mutex);
     return question(self.surface);
@@ -330,6 +359,7 @@ void bind_surface(py::module_& module) {
       .value("OCCUPIED", SpaceState::kOccupied, "inside a surface, as far as the truncation");
   bind_mesh(module);
   bind_distances(module);
+  bind_changes(module);
   bind_model(module);
   bind_map_surface(module);
 }

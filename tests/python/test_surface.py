@@ -1,8 +1,10 @@
 from __future__ import annotations
 
+import struct
 import subprocess
 import sys
 import threading
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -86,6 +88,56 @@ def test_what_makes_no_sense_is_refused(rig: twofold.CameraRig) -> None:
     assert model.memory_bytes() > 0
     model.clear()
     assert len(model.mesh().triangles) == 0
+
+
+def test_what_changed_in_a_mesh_is_told_in_cells(rig: twofold.CameraRig) -> None:
+    model = twofold.SurfaceModel(rig, voxel_size=0.05)
+    model.add(wall(rig, 1.5), twofold.Pose())
+    all_of_it = model.mesh_changes()
+    assert all_of_it.cell_size == pytest.approx(0.4)
+    pieces = all_of_it.pieces
+    assert sum(len(piece.mesh.triangles) for piece in pieces) == len(model.mesh().triangles)
+    assert len(pieces[0].cell) == 3
+    cells = {tuple(piece.cell) for piece in pieces}
+    revision = all_of_it.revision
+    del all_of_it, pieces
+    assert model.mesh_changes(revision).pieces == []
+    model.clear()
+    gone = model.mesh_changes(revision).pieces
+    assert {tuple(piece.cell) for piece in gone} == cells
+    assert all(len(piece.mesh.triangles) == 0 for piece in gone)
+
+
+def write_png(file: Path, rgb: tuple[int, int, int], height: int, width: int) -> None:
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    rows = (b"\0" + bytes(rgb) * width) * height
+    file.write_bytes(
+        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+    )
+
+
+def test_sources_and_rectifiers_give_colours(tmp_path: Path, stereo_yaml: Path) -> None:
+    for camera in ("image_2", "image_3"):
+        (tmp_path / camera).mkdir()
+        for name in ("000000.png", "000001.png"):
+            write_png(tmp_path / camera / name, (200, 60, 30), 48, 64)
+    (tmp_path / "times.txt").write_text("0.0\n0.1\n")
+    (tmp_path / "calib.txt").write_text(
+        "P2: 50 0 31.5 0 0 50 23.5 0 0 0 1 0\nP3: 50 0 31.5 -5 0 50 23.5 0 0 0 1 0\n"
+    )
+    source = twofold.Source(f"kitti:{tmp_path}")
+    frame = source.next()
+    assert frame is not None and frame.left.ndim == 2
+    coloured = source.in_colour(frame)
+    del frame
+    assert (coloured.left == (30, 60, 200)).all() and coloured.left.shape == (48, 64, 3)
+    assert coloured.right is not None and coloured.right.shape == (48, 64)
+
+    raw = twofold.Frame(5, coloured.left.copy(), coloured.left.copy())
+    assert (twofold.FrameRectifier(stereo_yaml).rectify_in_colour(raw).left == (30, 60, 200)).all()
 
 
 def test_a_runs_surface_follows_its_map() -> None:
