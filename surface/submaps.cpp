@@ -104,14 +104,16 @@ void SubmapSurface::fuse_bent(std::size_t most) {
     std::stable_sort(bent.begin(), bent.end(),
                      [](const auto& a, const auto& b) { return a.first > b.first; });
   const std::size_t now = std::min(most, bent.size());
-  for (std::size_t n = 0; n < now; ++n) {
-    Submap& submap = *bent[n].second;
-    submap.content.volume_to_change().clear();
-    submap.content.free = std::make_shared<FreeSpace>(options_, limits_.max_free_depth);
-    submap.content.free_shared = false;
-    for (Member& member : submap.members) report_.fused_anew += fuse(submap, member, {});
-  }
+  for (std::size_t n = 0; n < now; ++n) fuse_anew(*bent[n].second);
   bent_ = bent.size() - now;
+}
+
+/// Other submaps' images are not asked again about what they hide: the map may have culled their keyframes.
+void SubmapSurface::fuse_anew(Submap& submap) {
+  const std::shared_ptr<const FreeSpace> before = submap.content.free;
+  submap.content = submap.content.emptied();
+  for (Member& member : submap.members) report_.fused_anew += fuse(submap, member, {});
+  if (before != nullptr) submap.content.free_to_change().forget_as(*before);
 }
 
 /// By how much a point that one of the keyframes sees would be fused elsewhere now, at most [m].
@@ -217,6 +219,22 @@ void SubmapSurface::forget_hidden(const Submap& fused_into, const SE3& T_k_w) {
   for (const auto& submap : submaps_)
     if (submap.get() != &fused_into && submap->part == fused_into.part)
       submap->content.free_to_change().forget_hidden(view_, T_k_w * submap->T_w_s);
+}
+
+SubmapSurface::Submap::Content::Content(const SurfaceOptions& options, const SubmapOptions& submaps)
+    : volume(std::make_shared<SurfaceVolume>(options)),
+      free(submaps.free_space ? std::make_shared<FreeSpace>(options, submaps.max_free_depth) : nullptr) {}
+
+SubmapSurface::Submap::Content SubmapSurface::Submap::Content::emptied() const {
+  Content empty = *this;
+  empty.volume = std::make_shared<SurfaceVolume>(volume->emptied());
+  if (free != nullptr) empty.free = std::make_shared<FreeSpace>(free->emptied());
+  empty.volume_shared = empty.free_shared = false;
+  return empty;
+}
+
+std::size_t SubmapSurface::Submap::Content::bytes() const {
+  return volume->bytes() + (free != nullptr ? free->bytes() : 0);
 }
 
 SurfaceVolume& SubmapSurface::Submap::Content::volume_to_change() {

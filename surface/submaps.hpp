@@ -47,7 +47,7 @@ struct KeyframeDepth {
 struct SharedSubmap {
   KeyframeId part{0};  ///< the map part whose world T_w_s is of
   std::shared_ptr<const SurfaceVolume> volume;
-  std::shared_ptr<const FreeSpace> free;  ///< without anything unless SubmapOptions::free_space
+  std::shared_ptr<const FreeSpace> free;  ///< null unless SubmapOptions::free_space
   SE3 T_w_s;
 };
 
@@ -134,15 +134,15 @@ class SubmapSurface {
     std::vector<Member> members;
     /// Samples and free space; copied before they change if somebody else may have them.
     struct Content {
-      Content(const SurfaceOptions& options, const SubmapOptions& submaps)
-          : volume(std::make_shared<SurfaceVolume>(options)),
-            free(std::make_shared<FreeSpace>(options, submaps.max_free_depth)) {}
+      Content(const SurfaceOptions& options, const SubmapOptions& submaps);
       [[nodiscard]] SurfaceVolume& volume_to_change();
       [[nodiscard]] FreeSpace& free_to_change();
-      [[nodiscard]] std::size_t bytes() const { return volume->bytes() + free->bytes(); }
+      [[nodiscard]] std::size_t bytes() const;
+      /// With nothing in it, to fuse anew. What somebody else has stays as it is, and is not copied.
+      [[nodiscard]] Content emptied() const;
 
       std::shared_ptr<SurfaceVolume> volume;
-      std::shared_ptr<FreeSpace> free;
+      std::shared_ptr<FreeSpace> free;  ///< null unless SubmapOptions::free_space
       bool volume_shared = false, free_shared = false;
     };
     Content content;
@@ -158,6 +158,7 @@ class SubmapSurface {
   void add_keyframe(const GraphSnapshot& graph, const Keyframe& keyframe, Waiting frame);
   [[nodiscard]] Submap& submap_for(const GraphSnapshot& graph, const Keyframe& keyframe);
   void fuse_bent(std::size_t most);
+  void fuse_anew(Submap& submap);
   [[nodiscard]] double bend_of(const Submap& submap) const;
   /// False for an image without readings, of which nothing becomes.
   /// @param images  empty: those that the member has packed

@@ -50,6 +50,12 @@ class SurfaceVolume {
     blocks_.clear();
     cleared_ = ++revision_;
   }
+  /// What clear would leave of this one, which stays as it is: revisions go on.
+  [[nodiscard]] SurfaceVolume emptied() const {
+    SurfaceVolume empty(options_);
+    empty.cleared_ = empty.revision_ = revision_ + 1;
+    return empty;
+  }
 
   /// Blocks of this volume that a block of another one, whose frame lies at T_v_o, has a say in; those that
   /// were missing are there then, empty. Numbers, each once.

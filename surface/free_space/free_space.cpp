@@ -111,6 +111,13 @@ void FreeSpace::forget_hidden(const DepthView& view, const SE3& T_c_v) {
   if (!groups_.empty()) visit_all(Look(view, options_, T_c_v, 0, false));
 }
 
+void FreeSpace::forget_as(const FreeSpace& before) {
+  for (const auto& [at, cells] : before.hidden_) {
+    hidden_[at] |= cells;
+    if (const auto group = groups_.find(at); group != groups_.end()) group->second &= ~cells;
+  }
+}
+
 void FreeSpace::visit_all(const Look& look) {
   Vector3 low, high;
   look.box(low, high);
@@ -141,7 +148,9 @@ void FreeSpace::forget_if_hidden(const Look& look, const BlockPosition& cell) {
   const auto group = groups_.find(group_of(cell));
   if (group == groups_.end() || !group->second[bit_of(cell)]) return;
   const auto hiding = look.hidden_by(cell);
-  if (hiding && contains(*hiding)) group->second.reset(bit_of(cell));
+  if (!hiding || !contains(*hiding)) return;
+  group->second.reset(bit_of(cell));
+  if (!look.frees()) hidden_[group->first].set(bit_of(cell));
 }
 
 void FreeSpace::free_all(const BlockPosition& first, std::int32_t edge) {
@@ -150,10 +159,12 @@ void FreeSpace::free_all(const BlockPosition& first, std::int32_t edge) {
     for (std::int32_t gy = 0; gy < edge; gy += step)
       for (std::int32_t gx = 0; gx < edge; gx += step) {
         const BlockPosition at{first.x + gx, first.y + gy, first.z + gz};
-        Group& group = groups_[group_of(at)];
+        Group cells;
         for (std::int32_t z = 0; z < step; ++z)
           for (std::int32_t y = 0; y < step; ++y)
-            for (std::int32_t x = 0; x < step; ++x) group.set(bit_of({at.x + x, at.y + y, at.z + z}));
+            for (std::int32_t x = 0; x < step; ++x) cells.set(bit_of({at.x + x, at.y + y, at.z + z}));
+        groups_[group_of(at)] |= cells;
+        if (const auto hidden = hidden_.find(group_of(at)); hidden != hidden_.end()) hidden->second &= ~cells;
       }
 }
 
@@ -212,9 +223,12 @@ std::optional<double> FreeSpace::clearance(const SurfaceVolume& volume, const Ve
 }
 
 std::size_t FreeSpace::bytes() const {
-  using Node = decltype(groups_)::value_type;
-  return groups_.size() * (sizeof(Node) + 2 * sizeof(void*)) +
-         (groups_.empty() ? 0 : groups_.bucket_count() * sizeof(void*));
+  return bytes_of(groups_) + bytes_of(hidden_);
+}
+
+std::size_t FreeSpace::bytes_of(const Groups& groups) {
+  return groups.size() * (sizeof(Groups::value_type) + 2 * sizeof(void*)) +
+         (groups.empty() ? 0 : groups.bucket_count() * sizeof(void*));
 }
 
 BlockPosition FreeSpace::group_of(const BlockPosition& cell) {

@@ -34,10 +34,18 @@ class FreeSpace {
   /// Forgets what a depth image does not see into any more, and makes nothing free: for what other images
   /// saw through, into whose space things have come.
   void forget_hidden(const DepthView& view, const SE3& T_c_v);
+  /// Forgets those cells that forget_hidden made `before` forget, unless an image added to it saw through
+  /// them later: `before` is this one before its images were added anew.
+  void forget_as(const FreeSpace& before);
   /// Cells of this one that lie wholly in free cells of another one, whose frame lies at T_v_o: those of a
   /// turned one lose a rim of a cell.
   void add(const FreeSpace& other, const SE3& T_v_o);
-  void clear() { groups_.clear(); }
+  void clear() {
+    groups_.clear();
+    hidden_.clear();
+  }
+  /// Another one of the same options and reach, in which nothing is free.
+  [[nodiscard]] FreeSpace emptied() const { return {options_, reach_}; }
 
   /// Whether the cell was looked through, whatever the volume has there by now.
   [[nodiscard]] bool contains(const BlockPosition& cell) const;
@@ -54,6 +62,7 @@ class FreeSpace {
   struct Hash {
     std::size_t operator()(const BlockPosition& at) const { return hash_of(at); }
   };
+  using Groups = std::unordered_map<BlockPosition, Group, Hash>;
   class Look;  // of one depth image
   enum class Sight : std::uint8_t { kNone, kThrough, kHidden, kMixed };
 
@@ -66,10 +75,12 @@ class FreeSpace {
   void free_all(const BlockPosition& first, std::int32_t edge);
   [[nodiscard]] static BlockPosition group_of(const BlockPosition& cell);
   [[nodiscard]] static std::size_t bit_of(const BlockPosition& cell);
+  [[nodiscard]] static std::size_t bytes_of(const Groups& groups);
 
   SurfaceOptions options_;
   double reach_;
-  std::unordered_map<BlockPosition, Group, Hash> groups_;
+  Groups groups_;  ///< free cells
+  Groups hidden_;  ///< cells that were free until forget_hidden, and not seen through since
 };
 
 }  // namespace twofold

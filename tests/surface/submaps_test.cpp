@@ -180,6 +180,95 @@ TEST_F(SubmapSurfaceTest, WhatIsSharedStaysAsItIs) {
   EXPECT_GT(shared[0].free->bytes(), 0u);
 }
 
+TEST_F(SubmapSurfaceTest, WhatIsSharedIsNotCopiedToBeFusedAnew) {
+  limits_.free_space = true;
+  SubmapSurface surface(rig_, testing::fine_options(), limits_);
+  add_all(surface);
+  const std::vector<SharedSubmap> shared = surface.share(KeyframeId{0});
+  const std::uint64_t revision = shared[0].volume->revision();
+  const SE3 T_k_w = writer_.graph().keyframe(KeyframeId{1}).T_k_w;
+  writer_.set_pose(KeyframeId{1}, SE3(SO3(), Vector3(0.008, 0, 0)) * T_k_w);
+  surface.step(writer_.publish());
+  EXPECT_EQ(shared[0].volume->revision(), revision);
+  const SurfaceVolume& anew = *surface.placed(KeyframeId{0})[0].volume;
+  EXPECT_NE(&anew, shared[0].volume.get());
+  // Cleared once and fused once for each keyframe, and each is a change to whoever compares revisions.
+  EXPECT_EQ(anew.cleared(), revision + 1);
+  EXPECT_EQ(anew.revision(), revision + 1 + static_cast<std::uint64_t>(limits_.max_keyframes));
+}
+
+TEST_F(SubmapSurfaceTest, FreeSpaceIsKeptForThoseWhoAskOnly) {
+  SubmapSurface without(rig_, testing::fine_options(), limits_);
+  add_all(without);
+  const std::vector<SharedSubmap> shared = without.share(KeyframeId{0});
+  ASSERT_EQ(shared.size(), 3u);
+  for (const SharedSubmap& submap : shared) EXPECT_EQ(submap.free, nullptr);
+}
+
+/// Two keyframes that look along z at a wall, in one submap, and one that a ball hides part of it from, in
+/// another.
+class HiddenSpaceTest : public SubmapSurfaceTest {
+ protected:
+  HiddenSpaceTest() {
+    limits_.free_space = true;
+    ball_ = {{0, 0, 1.8}, 0.3};
+  }
+  /// @param before  the keyframe whose submap it goes to; kNoKeyframe: one of its own
+  void look_at_wall(SubmapSurface& surface, const Ball& ball, KeyframeId before) {
+    Keyframe keyframe;
+    keyframe.id = KeyframeId{static_cast<std::uint32_t>(writer_.graph().keyframe_count())};
+    keyframe.frame_index = 10 * static_cast<std::int64_t>(index(keyframe.id));
+    keyframe.median_depth = 3;
+    writer_.add_keyframe(keyframe);
+    if (before != kNoKeyframe) writer_.set_edge(keyframe.id, testing::edge_to(before, 50));
+    cv::Mat depth;
+    testing::depth_of(rig_, SE3(), ball, 3).convertTo(depth, CV_16U, 1 / rig_.depth_unit);
+    surface.offer(pack_keyframe_depth(keyframe.frame_index, depth, {}));
+    surface.step(writer_.publish());
+  }
+  /// Whether the first submap has the cell of a position in the world free.
+  [[nodiscard]] static bool is_free(SubmapSurface& surface, const Vector3& x_w) {
+    const SharedSubmap first = surface.share(KeyframeId{0}).front();
+    const Eigen::Vector3i cell = (first.T_w_s.inverse() * x_w / (4 * kVoxel)).array().floor().cast<int>();
+    return first.free->contains({cell.x(), cell.y(), cell.z()});
+  }
+  /// Keyframe `n` of it moves by more than half a voxel.
+  void bend_first_submap(SubmapSurface& surface, std::uint32_t n) {
+    writer_.set_pose(KeyframeId{n}, SE3(SO3(), Vector3(0.6 * kVoxel, 0, 0)));
+    const int before = surface.report().fused_anew;
+    surface.step(writer_.publish());
+    ASSERT_EQ(surface.report().fused_anew, before + 2);
+  }
+
+  static constexpr double kVoxel = 0.02;
+  const Ball nowhere_{{0, 0, 100}, 0.1};
+  const Vector3 behind_{0.01, 0.01, 2.3}, aside_{0.6, 0.01, 2.3};
+};
+
+TEST_F(HiddenSpaceTest, WhatALaterImageHidStaysHiddenWhereASubmapIsFusedAnew) {
+  SubmapSurface surface(rig_, testing::fine_options(kVoxel), limits_);
+  look_at_wall(surface, nowhere_, kNoKeyframe);
+  look_at_wall(surface, nowhere_, KeyframeId{0});
+  ASSERT_TRUE(is_free(surface, behind_) && is_free(surface, aside_));
+  look_at_wall(surface, ball_, kNoKeyframe);
+  ASSERT_EQ(surface.submap_count(), 2u);
+  ASSERT_FALSE(is_free(surface, behind_));
+  bend_first_submap(surface, 1);
+  EXPECT_FALSE(is_free(surface, behind_));
+  EXPECT_TRUE(is_free(surface, aside_));
+}
+
+TEST_F(HiddenSpaceTest, WhatWasSeenThroughAgainStaysFreeWhereASubmapIsFusedAnew) {
+  SubmapSurface surface(rig_, testing::fine_options(kVoxel), limits_);
+  look_at_wall(surface, nowhere_, kNoKeyframe);
+  look_at_wall(surface, ball_, kNoKeyframe);
+  ASSERT_FALSE(is_free(surface, behind_));
+  look_at_wall(surface, nowhere_, KeyframeId{0});
+  ASSERT_TRUE(is_free(surface, behind_));
+  bend_first_submap(surface, 2);
+  EXPECT_TRUE(is_free(surface, behind_));
+}
+
 TEST_F(SubmapSurfaceTest, CulledKeyframesLeaveWhatTheyAdded) {
   SubmapSurface surface(rig_, testing::fine_options(), limits_);
   add_all(surface);
