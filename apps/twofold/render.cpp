@@ -28,6 +28,7 @@ struct RenderArguments {
   std::string out;
   std::string surface;
   std::string seen;
+  int seen_every = 5;
 };
 
 constexpr double kNsPerSecond = 1e9;
@@ -191,7 +192,8 @@ void run_render(const RenderArguments& arguments) {
     throw IoError(arguments.source, "is not a rendered source (synthetic:SCENE?...)");
   const auto source = open_source(arguments.source);
   if (!arguments.surface.empty()) write_true_surface(arguments.surface, *source);
-  if (!arguments.seen.empty()) write_seen_surface(arguments.seen, *open_source(arguments.source));
+  if (!arguments.seen.empty())
+    write_seen_surface(arguments.seen, *open_source(arguments.source), arguments.seen_every);
   if (arguments.out.empty()) return;
 
   RenderedRecording recording(arguments.out, source->rig(), rate_of(source->ground_truth()));
@@ -223,6 +225,12 @@ void add_render_command(CLI::App& app, int& exit_code) {
       command->add_option("--seen", arguments->seen,
                           "the same, as far as depth images show them (sensor=rgbd) or both cameras do "
                           "(sensor=stereo); with --out or --surface or alone");
+  command
+      ->add_option("--seen-every", arguments->seen_every,
+                   "for --seen, every so many-th frame is asked: as many as surface --every fuses")
+      ->check(above_zero())
+      ->capture_default_str()
+      ->needs(seen);
   command->callback([arguments, out, surface, seen, &exit_code] {
     if (out->count() + surface->count() + seen->count() == 0)
       throw IoError("--out", "is required, or --surface or --seen");

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "io/files/mesh_file.hpp"
 #include "io/sources/open_source.hpp"
 #include "tests/io/scratch_folder.hpp"
 
@@ -49,6 +50,22 @@ TEST(RenderCommand, StereoIsReadBackAsEuroc) {
   const std::string source = "synthetic:courtyard?width=160&height=120&frames=6&drop=0.3";
   ASSERT_EQ(render(source, scratch / "out"), 0);
   expect_same_recording(*open_source(source), *open_source("euroc:" + (scratch / "out")));
+}
+
+TEST(RenderCommand, SeenIsWhatTheAskedFramesShow) {
+  const ScratchFolder scratch;
+  const auto triangles_seen = [&](int every) {
+    const std::string file = scratch / fmt::format("seen_{}.ply", every);
+    const std::string command = fmt::format(
+        "'{}' render 'synthetic:desk?width=160&height=120&frames=41&sensor=rgbd' --seen '{}' --seen-every {} "
+        ">/dev/null 2>&1",
+        TWOFOLD_BINARY, file, every);
+    EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), 0);
+    return read_ply_mesh(file).triangles.size();
+  };
+  const std::size_t of_one = triangles_seen(100), of_two = triangles_seen(40);
+  EXPECT_GT(of_one, 1000U);
+  EXPECT_GT(of_two, of_one);
 }
 
 TEST(RenderCommand, RgbdIsReadBackAsTum) {

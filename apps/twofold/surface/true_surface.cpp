@@ -15,7 +15,6 @@ namespace {
 
 constexpr float kPiece = 0.01f;  // longest side of a triangle that is seen or not [m]
 constexpr float kScreen = 0.1f;  // the same of what stands in the way of a pair [m]
-constexpr int kEvery = 5;        // frames
 
 TriangleMesh expect_surface(const FrameSource& source) {
   auto mesh = source.true_surface();
@@ -100,7 +99,7 @@ void write_true_surface(const std::filesystem::path& file, const FrameSource& so
   fmt::print("{} triangles written to {}\n", mesh.triangles.size(), file.string());
 }
 
-void write_seen_surface(const std::filesystem::path& file, FrameSource& source) {
+void write_seen_surface(const std::filesystem::path& file, FrameSource& source, int every) {
   const Rig& rig = source.rig();
   if (rig.kind == SensorKind::kMono)
     throw IoError("--seen", "one camera sees no depth: the source's sensor must be rgbd or stereo");
@@ -111,7 +110,7 @@ void write_seen_surface(const std::filesystem::path& file, FrameSource& source) 
   Frame frame;
   FrameStatus status;
   for (std::int64_t n = 0; (status = source.next(frame)) == FrameStatus::kFrame; ++n) {
-    if (n % kEvery != 0) continue;
+    if (n % every != 0) continue;
     const auto pose = std::lower_bound(poses.begin(), poses.end(), frame.t_ns,
                                        [](const TimedPose& p, std::int64_t t) { return p.t_ns < t; });
     if (pose != poses.end() && pose->t_ns == frame.t_ns)

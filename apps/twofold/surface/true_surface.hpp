@@ -11,7 +11,8 @@ namespace twofold {
 void write_true_surface(const std::filesystem::path& file, const FrameSource& source);
 
 /// The same, cut into triangles of a centimetre, of which those are kept that a depth image shows or, of a
-/// pair, both cameras at once. Reads the source to its end. Throws IoError, also when it is one camera's.
-void write_seen_surface(const std::filesystem::path& file, FrameSource& source);
+/// pair, both cameras at once: every so many-th frame is asked. Reads the source to its end. Throws IoError,
+/// also when it is one camera's.
+void write_seen_surface(const std::filesystem::path& file, FrameSource& source, int every);
 
 }  // namespace twofold
