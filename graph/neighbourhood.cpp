@@ -66,6 +66,21 @@ void weighted_breadth_first(const GraphSnapshot& graph, KeyframeId root, std::si
   }
 }
 
+void for_each_component(const GraphSnapshot& graph,
+                        const std::function<void(const std::vector<TreeNode>& tree)>& visit) {
+  std::vector<KeyframeId> roots{graph.reference()};
+  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) roots.push_back(KeyframeId{k});
+  IdMap met;
+  VisitedSet visited;
+  std::vector<TreeNode> tree;
+  for (const KeyframeId root : roots) {
+    if (!graph.contains(root) || met.contains(root) || graph.keyframe(root).culled()) continue;
+    weighted_breadth_first(graph, root, graph.keyframe_count(), visited, tree);
+    for (const TreeNode& node : tree) met.set(node.id, 0);
+    visit(tree);
+  }
+}
+
 void direct_neighbours(const GraphSnapshot& graph, KeyframeId id, std::size_t max_count,
                        std::vector<KeyframeId>& result) {
   const std::size_t begin = result.size();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -38,6 +39,13 @@ struct TreeNode {
 /// members.
 void weighted_breadth_first(const GraphSnapshot& graph, KeyframeId root, std::size_t max_count,
                             VisitedSet& visited, std::vector<TreeNode>& result);
+
+/// Calls visit(tree) for each connected component of the keyframes that were not culled, with what
+/// weighted_breadth_first finds from its root: first the reference keyframe's, rooted there, then the others,
+/// by their oldest keyframe, which is the root. Poses, points and what edges hold may change meanwhile, which
+/// keyframes are connected may not.
+void for_each_component(const GraphSnapshot& graph,
+                        const std::function<void(const std::vector<TreeNode>& tree)>& visit);
 
 /// N1: the keyframe and all it has an edge to, strongest first  (eq. 6.5). Appends at most `max_count` ids.
 void direct_neighbours(const GraphSnapshot& graph, KeyframeId id, std::size_t max_count,

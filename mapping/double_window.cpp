@@ -1,6 +1,7 @@
 #include "mapping/double_window.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "mapping/edges.hpp"
 
@@ -89,14 +90,20 @@ void make_room(const GraphSnapshot& graph, std::size_t met, DoubleWindow& window
   remove_nodes(stays, window);
 }
 
-void number_nodes(DoubleWindow& window) {
-  window.position.clear();
-  for (std::size_t n = 0; n < window.nodes.size(); ++n) {
-    window.position.set(window.nodes[n].id, static_cast<int>(n));
-  }
+}  // namespace
+
+void DoubleWindow::number_nodes() {
+  position.clear();
+  for (std::size_t n = 0; n < nodes.size(); ++n) position.set(nodes[n].id, static_cast<int>(n));
 }
 
-}  // namespace
+DoubleWindow inner_window_of(std::vector<TreeNode> tree) {
+  DoubleWindow window;
+  window.nodes = std::move(tree);
+  window.inner = window.nodes.size();
+  window.number_nodes();
+  return window;
+}
 
 void select_double_window(const GraphSnapshot& graph, const MapperOptions& options, SelectionScratch& scratch,
                           DoubleWindow& window) {
@@ -104,12 +111,12 @@ void select_double_window(const GraphSnapshot& graph, const MapperOptions& optio
   const std::size_t count = inner + static_cast<std::size_t>(options.outer_window);
   weighted_breadth_first(graph, graph.reference(), count, scratch.visited, window.nodes);
   window.inner = std::min(inner, window.nodes.size());
-  number_nodes(window);
+  window.number_nodes();
   const std::size_t met = window.nodes.size();
   add_anchors(graph, static_cast<std::size_t>(options.max_anchors), scratch.met_anchors, window);
   if (window.nodes.size() == met) return;
   make_room(graph, met, window);
-  number_nodes(window);
+  window.number_nodes();
 }
 
 int marginalise_left_edges(GraphWriter& writer, const DoubleWindow& before, const DoubleWindow& now,

@@ -22,7 +22,12 @@ struct DoubleWindow {
   [[nodiscard]] bool contains(KeyframeId id) const { return position.contains(id); }
   [[nodiscard]] bool is_inner(int at) const { return at >= 0 && static_cast<std::size_t>(at) < inner; }
   [[nodiscard]] bool is_inner(KeyframeId id) const { return is_inner(position.find(id)); }
+  /// Brings `position` up to date with `nodes`.
+  void number_nodes();
 };
+
+/// All keyframes of a spanning tree as an inner window; the outer one is empty.
+[[nodiscard]] DoubleWindow inner_window_of(std::vector<TreeNode> tree);
 
 /// Scratch kept between rounds.
 struct SelectionScratch {

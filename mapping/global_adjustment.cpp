@@ -12,17 +12,6 @@
 namespace twofold {
 namespace {
 
-/// All keyframes connected with `root` as an inner window.
-DoubleWindow whole_component(const GraphSnapshot& graph, KeyframeId root) {
-  DoubleWindow window;
-  VisitedSet visited;
-  weighted_breadth_first(graph, root, graph.keyframe_count(), visited, window.nodes);
-  window.inner = window.nodes.size();
-  for (std::size_t n = 0; n < window.nodes.size(); ++n)
-    window.position.set(window.nodes[n].id, static_cast<int>(n));
-  return window;
-}
-
 MapperOptions without_budget(const MapperOptions& options) {
   MapperOptions all = options;
   all.max_points = std::numeric_limits<int>::max();
@@ -65,23 +54,17 @@ GlobalAdjustmentReport adjust_all_components(GraphWriter& writer, const Rig& rig
                                              const MapperOptions& options) {
   GlobalAdjustmentReport report;
   const MapperOptions all = without_budget(options);
-  const GraphSnapshot& graph = writer.graph();
-  std::vector<KeyframeId> roots{graph.reference()};
-  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) roots.push_back(KeyframeId{k});
-  IdMap met;
-  for (const KeyframeId root : roots) {
-    if (!graph.contains(root) || met.contains(root) || graph.keyframe(root).culled()) continue;
-    const DoubleWindow window = whole_component(graph, root);
-    for (const TreeNode& node : window.nodes) met.set(node.id, 0);
-    if (window.nodes.size() > static_cast<std::size_t>(options.global.max_keyframes)) {
+  for_each_component(writer.graph(), [&](const std::vector<TreeNode>& tree) {
+    if (tree.size() > static_cast<std::size_t>(options.global.max_keyframes)) {
       ++report.too_large;
-      continue;
+      return;
     }
+    const DoubleWindow window = inner_window_of(tree);
     adjust(writer, window, rig, all, report);
     marginalise_edges_of(writer, window);
     ++report.components;
-    report.keyframes += static_cast<int>(window.nodes.size());
-  }
+    report.keyframes += static_cast<int>(tree.size());
+  });
   return report;
 }
 

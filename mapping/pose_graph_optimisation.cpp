@@ -4,11 +4,10 @@
 #include "mapping/keyframe_pose_graph.hpp"
 
 namespace twofold {
-PoseGraphUpdate optimise_component(const GraphSnapshot& graph, KeyframeId root, const Rig& rig,
-                                   const MapperOptions& options, PoseGraphReport& report) {
-  VisitedSet visited;
-  std::vector<TreeNode> tree;
-  weighted_breadth_first(graph, root, graph.keyframe_count(), visited, tree);
+namespace {
+
+PoseGraphUpdate optimise_tree(const GraphSnapshot& graph, const std::vector<TreeNode>& tree, const Rig& rig,
+                              const MapperOptions& options, PoseGraphReport& report) {
   IdMap position;
   const auto information = [&](const Keyframe& from, const Keyframe& to, const Edge& edge) {
     return edge_information(from, to, edge, rig, options.edge);
@@ -28,19 +27,22 @@ PoseGraphUpdate optimise_component(const GraphSnapshot& graph, KeyframeId root, 
   return update;
 }
 
+}  // namespace
+
+PoseGraphUpdate optimise_component(const GraphSnapshot& graph, KeyframeId root, const Rig& rig,
+                                   const MapperOptions& options, PoseGraphReport& report) {
+  VisitedSet visited;
+  std::vector<TreeNode> tree;
+  weighted_breadth_first(graph, root, graph.keyframe_count(), visited, tree);
+  return optimise_tree(graph, tree, rig, options, report);
+}
+
 PoseGraphReport optimise_all_components(GraphWriter& writer, const Rig& rig, const MapperOptions& options) {
   PoseGraphReport report;
-  const GraphSnapshot& graph = writer.graph();
-  std::vector<KeyframeId> roots{graph.reference()};
-  for (std::uint32_t k = 0; k < graph.keyframe_count(); ++k) roots.push_back(KeyframeId{k});
-  IdMap done;
-  for (const KeyframeId root : roots) {
-    if (!graph.contains(root) || done.contains(root) || graph.keyframe(root).culled()) continue;
-    for (const KeyframePose& pose : optimise_component(graph, root, rig, options, report).poses) {
+  for_each_component(writer.graph(), [&](const std::vector<TreeNode>& tree) {
+    for (const KeyframePose& pose : optimise_tree(writer.graph(), tree, rig, options, report).poses)
       writer.set_pose(pose.id, pose.T_k_w);
-      done.set(pose.id, 0);
-    }
-  }
+  });
   return report;
 }
 

@@ -124,6 +124,43 @@ TEST(WeightedBreadthFirst, EmptyGraphAndUnknownRootGiveNothing) {
   EXPECT_TRUE(tree.empty());
 }
 
+TEST(ForEachComponent, MeetsEveryKeyframeOnceTheReferencesComponentFirst) {
+  for (unsigned seed = 1; seed <= 30; ++seed) {
+    std::mt19937 rng(seed);
+    GraphWriter writer = random_graph(rng, 60, 45);  // few edges: many components
+    writer.set_reference(KeyframeId{seed + 20});
+    writer.cull_keyframe(KeyframeId{seed}, KeyframeId{seed + 1});
+    const GraphSnapshot& graph = writer.graph();
+    VisitedSet visited;
+    std::vector<TreeNode> expected;
+    std::set<KeyframeId> met;
+    KeyframeId previous_root = kNoKeyframe;
+    for_each_component(graph, [&](const std::vector<TreeNode>& tree) {
+      const KeyframeId root = tree.front().id;
+      if (met.empty()) {
+        EXPECT_EQ(root, graph.reference());
+      } else {
+        for (const TreeNode& node : tree) EXPECT_LE(root, node.id) << "not rooted at its oldest keyframe";
+        EXPECT_TRUE(previous_root == kNoKeyframe || previous_root < root);
+        previous_root = root;
+      }
+      weighted_breadth_first(graph, root, graph.keyframe_count(), visited, expected);
+      ASSERT_EQ(tree.size(), expected.size());
+      for (std::size_t n = 0; n < tree.size(); ++n) {
+        EXPECT_EQ(tree[n].id, expected[n].id);
+        EXPECT_EQ(tree[n].parent, expected[n].parent);
+        EXPECT_TRUE(met.insert(tree[n].id).second) << "met twice";
+      }
+    });
+    EXPECT_EQ(met.size(), 59U);
+    EXPECT_FALSE(met.contains(KeyframeId{seed})) << "was culled";
+  }
+}
+
+TEST(ForEachComponent, AnEmptyGraphHasNone) {
+  for_each_component(GraphWriter().graph(), [](const std::vector<TreeNode>&) { FAIL(); });
+}
+
 TEST(DirectNeighbours, StrongestFirstAndBounded) {
   std::mt19937 rng(5);
   const GraphWriter writer = random_graph(rng, 20, 80);
