@@ -156,6 +156,8 @@ int run(const std::string& name, const std::string& mesh) {
   slam.finish();
   poses.close();
   made.get();  // throws what the surface's thread has thrown
+  planner.request_stop();
+  planner.join();
   surface.update(slam.map());
   const twofold::SurfaceSnapshot now = surface.snapshot();
   const auto T_world_camera = last ? now.pose_of(*last) : std::nullopt;

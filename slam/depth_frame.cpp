@@ -1,5 +1,6 @@
 #include "slam/depth_frame.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "imaging/row_offset.hpp"
@@ -28,7 +29,9 @@ cv::Mat depth_of_pair(const Rig& rig, const FrameView& frame, const PairMatching
   const cv::Size size(rig.camera.width, rig.camera.height);
   if (left.size() != size || right.size() != size)
     throw std::invalid_argument("left and right image must both be of the rig's size");
-  const double nearest = matching.min_depth > 0 ? matching.min_depth : rig.depth_min;
+  // What is nearer than depth_min, and cut later, still has to be matched, lest it be taken for farther.
+  const double nearest =
+      matching.min_depth > 0 ? matching.min_depth : std::min(rig.depth_min, kNearestStereo);
   return stereo_depth(rig, left, without_row_offset(right, matching.row_offset), nearest);
 }
 

@@ -20,10 +20,11 @@ struct SurfaceModelOptions {
   /// Free space away from surfaces is kept as far as this from the camera [m] >= 0; 0: as far as there are
   /// readings.
   double max_free_depth = 0;
-  /// Stereo: depth is looked for from here on [m] >= 0; 0: from CameraRig::depth_min on. The nearer, the
-  /// longer `add` takes. Nothing nearer than any of three is seen: this, CameraRig::depth_min, and the depth
-  /// whose disparity is 0.4 of the image's width, 2.5 fx baseline / width. What is nearer leaves holes, and
-  /// some wrong depth where its texture repeats: a robot has to look for it otherwise.
+  /// Stereo: depth is looked for from here on [m] >= 0; 0: from CameraRig::depth_min, or 0.4 if that is
+  /// nearer. The nearer, the longer `add` takes. Nothing nearer than any of three is seen: this,
+  /// CameraRig::depth_min, and the depth whose disparity is 0.4 of the image's width, 2.5 fx baseline /
+  /// width. What is nearer than depth is looked for leaves holes, and in some per cent of its pixels wrong
+  /// depth, by chance: a robot has to look for it otherwise.
   double min_stereo_depth = 0;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
