@@ -70,7 +70,7 @@ struct CullingOptions {
 /// Bundle adjustment of the whole map at the end of a run.
 struct GlobalAdjustmentOptions {
   bool enabled = true;
-  int max_keyframes = 3000;  ///< maps of more keep what windows and pose graph gave them, >= 0
+  int max_keyframes = 5000;  ///< maps of more keep what windows and pose graph gave them, >= 0
   int max_iterations = 10;   ///< Levenberg-Marquardt steps a round, accepted or not, >= 1
   int rounds = 2;            ///< after each, what disagrees is removed, >= 1
 
