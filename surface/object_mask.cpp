@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <random>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -127,7 +128,21 @@ void ObjectMasker::raise(const std::vector<Vector3>& points, SupportPlane& plane
   }
 }
 
-cv::Mat ObjectMasker::above_plane(const cv::Mat& depth) const {
+std::string ObjectMasker::find_plane(const cv::Mat& depth) {
+  const std::vector<Vector3> points = near_points(depth);
+  if (points.size() < kLeastPoints)
+    return fmt::format("hardly any depth between {:g} and {:g} m", rig_.depth_min, options_.farthest);
+  SupportPlane plane = plane_;
+  if (!has_plane_ || !refine(points, plane)) {
+    if (!search(points, plane)) return "no plane that an object could stand on";
+    raise(points, plane);
+  }
+  plane_ = plane;
+  has_plane_ = true;
+  return {};
+}
+
+cv::Mat ObjectMasker::candidates(const cv::Mat& depth) const {
   cv::Mat mask(depth.size(), CV_8UC1, cv::Scalar(0));
   for (int y = 0; y < depth.rows; ++y) {
     const auto* row = depth.ptr<std::uint16_t>(y);
@@ -135,7 +150,7 @@ cv::Mat ObjectMasker::above_plane(const cv::Mat& depth) const {
       const double z = rig_.depth_unit * row[x];
       if (z < rig_.depth_min || z > options_.farthest) continue;
       const double height = plane_.height(rig_.camera.unproject(Vector2(x, y)) * z);
-      if (height > std::max(options_.above, 4 * options_.depth_noise * z * z))
+      if (options_.held || height > std::max(options_.above, 4 * options_.depth_noise * z * z))
         mask.at<std::uint8_t>(y, x) = 255;
     }
   }
@@ -146,26 +161,18 @@ tl::expected<cv::Mat, std::string> ObjectMasker::mask(const cv::Mat& depth) {
   TWOFOLD_CHECK(
       depth.type() == CV_16UC1 && depth.cols == rig_.camera.width && depth.rows == rig_.camera.height,
       "a depth image of the rig");
-  const std::vector<Vector3> points = near_points(depth);
-  if (points.size() < kLeastPoints)
-    return tl::unexpected(
-        fmt::format("hardly any depth between {:g} and {:g} m", rig_.depth_min, options_.farthest));
-  SupportPlane plane = plane_;
-  if (!has_plane_ || !refine(points, plane)) {
-    if (!search(points, plane)) return tl::unexpected(std::string("no plane that an object could stand on"));
-    raise(points, plane);
-  }
-  plane_ = plane;
-  has_plane_ = true;
-  cv::Mat above = above_plane(depth);
+  if (!options_.held)
+    if (std::string missing = find_plane(depth); !missing.empty()) return tl::unexpected(std::move(missing));
+  cv::Mat near = candidates(depth);
   // Specks of noise go; then all pieces but the large ones.
-  cv::morphologyEx(above, above, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8UC1));
+  cv::morphologyEx(near, near, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8UC1));
   cv::Mat label, size, centre;
-  const int pieces = cv::connectedComponentsWithStats(above, label, size, centre);
+  const int pieces = cv::connectedComponentsWithStats(near, label, size, centre);
   int largest = 0;
   for (int n = 1; n < pieces; ++n) largest = std::max(largest, size.at<int>(n, cv::CC_STAT_AREA));
   if (largest < kLeastObject * static_cast<double>(depth.total()))
-    return tl::unexpected(std::string("nothing is left above the support plane"));
+    return tl::unexpected(std::string(options_.held ? "nothing near enough holds together"
+                                                    : "nothing is left above the support plane"));
   cv::Mat object(depth.size(), CV_8UC1, cv::Scalar(0));
   for (int n = 1; n < pieces; ++n)
     if (size.at<int>(n, cv::CC_STAT_AREA) >= kPieceShare * largest) object.setTo(255, label == n);
@@ -198,6 +205,12 @@ cv::Mat fill_outside(const cv::Mat& image, const cv::Mat& mask) {
   cv::blur(filled, filled, {kSmoothing, kSmoothing});
   image.copyTo(filled, mask);
   return filled;
+}
+
+bool reaches_border(const cv::Mat& mask, int erode) {
+  const int rim = erode + 1;
+  const cv::Rect inner(rim, rim, std::max(0, mask.cols - 2 * rim), std::max(0, mask.rows - 2 * rim));
+  return cv::countNonZero(mask(inner)) < cv::countNonZero(mask);
 }
 
 cv::Mat mask_in_right(const Rig& rig, const cv::Mat& mask, const cv::Mat& depth) {

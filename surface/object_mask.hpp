@@ -13,9 +13,11 @@ namespace twofold {
 /// What separates an object from the place it stands in.
 struct ObjectMaskOptions {
   double farthest = 0.8;  ///< depth cut: nothing beyond belongs to the object [m] > 0
-  double above = 0.003;   ///< the object begins this far above the support plane, or four standard deviations
-                          ///< of the depth, whichever is more [m] >= 0
-  int erode = 2;          ///< pixels taken from the mask's rim, where depths mix, in [0, 20]
+  bool held = false;  ///< by hand, before a camera: it stands on nothing, and the depth cut alone says what
+                      ///< it is
+  double above = 0.003;  ///< the object begins this far above the support plane, or four standard deviations
+                         ///< of the depth, whichever is more [m] >= 0
+  int erode = 2;         ///< pixels taken from the mask's rim, where depths mix, in [0, 20]
   double depth_noise = 0.0;  ///< to be set: standard deviation of a depth z is depth_noise z^2 [1/m] > 0
 
   /// Empty when valid; otherwise names the field, the rule and the value.
@@ -32,7 +34,8 @@ struct SupportPlane {
 
 /// Finds the object in depth images of a camera that looks down at it  (after thesis 6.5.3): what is near
 /// enough, stands on the plane that most of that lies in, and holds together. Where two planes lie above each
-/// other, as a turntable on a table, the upper one is meant.
+/// other, as a turntable on a table, the upper one is meant. Of a thing that is held by hand, what is near
+/// enough and holds together, the hand with it.
 ///
 /// The first plane is searched for by random samples, always the same ones; later images start from the plane
 /// of the one before, so that a camera may walk. Same calls, same masks. One thread at a time.
@@ -47,6 +50,8 @@ class ObjectMasker {
 
   /// Of the last image that had one.
   [[nodiscard]] const SupportPlane& plane() const { return plane_; }
+  /// Upwards in the camera's frame, unit: that plane's normal; of a thing that is held, upwards in the image.
+  [[nodiscard]] Vector3 up() const { return options_.held ? Vector3(0, -1, 0) : plane_.normal; }
 
  private:
   [[nodiscard]] std::vector<Vector3> near_points(const cv::Mat& depth) const;
@@ -56,7 +61,10 @@ class ObjectMasker {
   [[nodiscard]] bool refine(const std::vector<Vector3>& points, SupportPlane& plane) const;
   [[nodiscard]] bool search(const std::vector<Vector3>& points, SupportPlane& plane) const;
   void raise(const std::vector<Vector3>& points, SupportPlane& plane) const;
-  [[nodiscard]] cv::Mat above_plane(const cv::Mat& depth) const;
+  /// Empty, or in words what was not found.
+  [[nodiscard]] std::string find_plane(const cv::Mat& depth);
+  /// What is near enough, and above the plane if the object stands on one.
+  [[nodiscard]] cv::Mat candidates(const cv::Mat& depth) const;
 
   Rig rig_;
   ObjectMaskOptions options_;
@@ -68,6 +76,10 @@ class ObjectMasker {
 /// of the nearest one inside, smoothed, so that no edge marks where the mask ends. CV_8UC1; with an empty
 /// mask, of one grey.
 [[nodiscard]] cv::Mat fill_outside(const cv::Mat& image, const cv::Mat& mask);
+
+/// Whether a mask comes so near to the image's border that what it shows may go on beyond it.
+/// @param erode  ObjectMaskOptions::erode, with which the mask was made
+[[nodiscard]] bool reaches_border(const cv::Mat& mask, int erode);
 
 /// The mask as the right camera of a pair sees it: each pixel moved by its disparity.
 /// @param depth  of the left image, CV_16UC1 in units of Rig::depth_unit

@@ -36,6 +36,7 @@ std::string SyntheticOptions::invalid_reason() const {
                                  outside("plain", plain, 0, 1),
                                  outside("shape", shape, 0, kTurntableShapes - 1),
                                  outside("texture", texture, 0, kTurntableTextures - 1),
+                                 outside("motion", motion, 0, kTurntableMotions - 1),
                                  outside("exposure_steps", exposure_steps, 0, 4),
                                  outside("flicker", flicker, 0, 0.5),
                                  outside("drop", drop, 0, 0.9),
@@ -48,8 +49,8 @@ std::string SyntheticOptions::invalid_reason() const {
   if (walkers > 0 && !has_walls)
     return fmt::format("walkers need ground to walk on, which {} has not", scene);
   if (plain > 0 && !has_walls) return fmt::format("plain panels need walls, which {} has not", scene);
-  if ((shape > 0 || texture > 0) && scene != "turntable")
-    return fmt::format("shape and texture are the turntable's, not of {}", scene);
+  if ((shape > 0 || texture > 0 || motion > 0) && scene != "turntable")
+    return fmt::format("shape, texture and motion are the turntable's, not of {}", scene);
   return {};
 }
 

@@ -36,6 +36,8 @@ struct SyntheticOptions {
   bool bare = false;  ///< nothing has texture: each surface is of one grey
   int shape = 0;      ///< turntable: 0 a carton, 1 a jar with a round lid
   int texture = 0;    ///< turntable: 0 prints, 1 wood, 2 stone
+  int motion = 0;     ///< turntable: 0 its plate turns, 1 the camera is carried around, 2 the thing is held
+                      ///< and turned by hand
   double exposure_steps = 0;  ///< every few seconds the gain changes at once, by up to so many stops, 0 .. 4
   double flicker = 0;         ///< amplitude of the lamps' flicker, 0 .. 0.5
   double drop = 0;            ///< share of frames lost, 0 .. 0.9; the first is always there

@@ -26,6 +26,12 @@ struct Staging {
 
 inline constexpr int kTurntableShapes = 2;    ///< a carton, a jar with a round lid
 inline constexpr int kTurntableTextures = 3;  ///< prints, wood, stone
+/// The plate turns, the camera is carried around, the thing is held and turned by hand.
+inline constexpr int kTurntableMotions = 3;
+
+struct TurntableOptions {
+  int shape = 0, texture = 0, motion = 0;  ///< each below its number
+};
 
 /// seed changes every texture and small things in the layout; the walls, the path and its length stay.
 /// plain: share of the walls' panels without texture.
@@ -41,8 +47,9 @@ inline constexpr int kTurntableTextures = 3;  ///< prints, wood, stone
     std::uint64_t seed);  ///< straight down onto a cratered surface, 10 m to 1 m
 /// Straight down onto ground that has detail of every size, 200 m to 20 cm.
 [[nodiscard]] Staging make_landing(std::uint64_t seed);
-/// A thing of 15 cm on a plate that turns before a camera, table and wall which stand still; the world is the
-/// thing's.
-[[nodiscard]] Staging make_turntable(std::uint64_t seed, int shape, int texture);
+/// A thing of 15 cm before a camera, and what is around it; the world is the thing's. It stands on a plate
+/// that turns while camera, table and wall stand still; or nothing moves but the camera, carried around it by
+/// hand; or a hand holds it from below and turns it before a camera that stands still.
+[[nodiscard]] Staging make_turntable(std::uint64_t seed, const TurntableOptions& options);
 
 }  // namespace twofold::synthetic

@@ -28,7 +28,8 @@ Staging make_place(const SyntheticOptions& options, std::uint64_t seed) {
   if (options.scene == "descent") return make_descent(seed);
   if (options.scene == "landing") return make_landing(seed);
   if (options.scene == "terrace") return make_terrace(seed);
-  if (options.scene == "turntable") return make_turntable(seed, options.shape, options.texture);
+  if (options.scene == "turntable")
+    return make_turntable(seed, {options.shape, options.texture, options.motion});
   throw std::invalid_argument("unknown scene '" + options.scene + "'");
 }
 

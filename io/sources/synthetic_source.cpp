@@ -106,6 +106,7 @@ SyntheticOptions parse(SourceParameters& parameters, SyntheticOptions options) {
   take_int(parameters, "walkers", &options.walkers);
   take_int(parameters, "shape", &options.shape);
   take_int(parameters, "texture", &options.texture);
+  take_int(parameters, "motion", &options.motion);
   take_switch(parameters, "object", &options.object);
   take_switch(parameters, "bare", &options.bare);
   parameters.expect_all_taken();

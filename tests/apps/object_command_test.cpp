@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -64,6 +65,49 @@ TEST(ObjectCommand, SaysWhatIsMissing) {
       run(folder, "object 'synthetic:turntable?sensor=stereo&width=160&height=120&frames=8'" + out);
   EXPECT_EQ(small.exit_code, 1);
   EXPECT_NE(small.err.find("too small in the images"), std::string::npos) << small.err;
+}
+
+TEST(ObjectCommand, ModelsWhatACameraIsCarriedAround) {
+  const ScratchFolder folder;
+  const Outcome outcome =
+      run(folder, "object 'synthetic:turntable?sensor=rgbd&motion=1&frames=75' --deterministic --out '" +
+                      (folder / "carton") + "'");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  const auto object = nlohmann::json::parse(content(folder / "carton/object.json"));
+  EXPECT_EQ(object["share_cut_off"], 0);
+  EXPECT_NEAR(object["box"]["size_m"][0], 0.1, 0.01);
+  EXPECT_NEAR(object["box"]["size_m"][1], 0.08, 0.01);
+  EXPECT_NEAR(object["box"]["size_m"][2], 0.147, 0.006);
+}
+
+TEST(ObjectCommand, ModelsWhatAHandTurnsOnlyIfItIsTold) {
+  const ScratchFolder folder;
+  const std::string object =
+      "object 'synthetic:turntable?sensor=rgbd&motion=2&frames=60' --deterministic --out '" +
+      (folder / "model") + "'";
+  expect_bad_input(run(folder, object), "--held");
+  const Outcome outcome = run(folder, object + " --held");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  // The space diagonal of a carton of 100 x 80 x 150 mm with 60 mm of a hand below, whichever way its box
+  // lies.
+  double square = 0;
+  const auto model = nlohmann::json::parse(content(folder / "model/object.json"));
+  for (const auto& edge : model["box"]["size_m"]) square += edge.get<double>() * edge.get<double>();
+  EXPECT_GT(std::sqrt(square), 0.2);
+  EXPECT_LT(std::sqrt(square), 0.33);
+}
+
+TEST(ObjectCommand, SaysThatWhatItModelsGoesOnBeyondTheImages) {
+  const ScratchFolder folder;
+  const Outcome near =
+      run(folder, "object 'synthetic:turntable?sensor=rgbd&height=240&frames=60' --deterministic --out '" +
+                      (folder / "near") + "'");
+  ASSERT_EQ(near.exit_code, 0) << near.err;
+  EXPECT_NE(near.err.find("100 % of the frames what is taken for the object reaches the image's border"),
+            std::string::npos)
+      << near.err;
 }
 
 TEST(ObjectCommand, SaysThatNothingTurned) {

@@ -100,6 +100,36 @@ TEST_F(ObjectMaskTest, FollowsThePlaneOfACameraThatWalks) {
   }
 }
 
+TEST_F(ObjectMaskTest, WhatIsHeldIsAllThatIsNearEnough) {
+  const SE3 T_c_w = SE3(SO3(), Vector3(0, 0, 0.4)) * looking_down(0.6);
+  ball_.centre = T_c_w.inverse() * Vector3(0, 0, 0.5);  // in mid-air; plate and table are beyond the cut
+  ObjectMaskOptions options = mask_options();
+  options.farthest = 0.54;
+  options.held = true;
+  const cv::Mat depth = render(T_c_w);
+  const cv::Mat all(parts_.size(), CV_8UC1, cv::Scalar(255));
+  ObjectMasker masker(rig_, options);
+  const auto mask = masker.mask(depth);
+  ASSERT_TRUE(mask) << mask.error();
+  EXPECT_GT(count(*mask, kBall), 0.75 * count(all, kBall));
+  EXPECT_EQ(count(*mask, kPlate) + count(*mask, kTable), 0);
+  EXPECT_EQ(masker.up(), Vector3(0, -1, 0));
+  EXPECT_FALSE(reaches_border(*mask, options.erode));
+}
+
+TEST_F(ObjectMaskTest, WhatGoesOnBeyondTheImageReachesItsBorder) {
+  const auto reaches = [](const cv::Rect& shown) {
+    cv::Mat mask(60, 80, CV_8UC1, cv::Scalar(0));
+    mask(shown).setTo(255);
+    return reaches_border(mask, 2);
+  };
+  EXPECT_FALSE(reaches({10, 10, 20, 20}));
+  EXPECT_FALSE(reaches({3, 3, 74, 54}));
+  EXPECT_TRUE(reaches({2, 10, 20, 20})) << "its rim was taken away";
+  EXPECT_TRUE(reaches({10, 10, 68, 20}));
+  EXPECT_TRUE(reaches({10, 10, 20, 48}));
+}
+
 TEST_F(ObjectMaskTest, SaysWhatIsMissing) {
   const cv::Mat none(rig_.camera.height, rig_.camera.width, CV_16UC1, cv::Scalar(0));
   const auto without_depth = ObjectMasker(rig_, mask_options()).mask(none);

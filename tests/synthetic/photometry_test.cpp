@@ -168,6 +168,29 @@ TEST_P(Photometry, SurfacesLookTheSameFromTwoPlaces) {
   }
 }
 
+/// The room's depth in the upper corners of the image tells whether the camera moves through it.
+TEST(TurntableScene, CameraOrThingMovesAsItIsTold) {
+  for (const int motion : {0, 1, 2}) {
+    SCOPED_TRACE(motion);
+    SyntheticOptions options = default_options("turntable");
+    options.motion = motion;
+    const SyntheticSequence sequence(options);
+    constexpr int kLater = 100;
+    const SE3 T_then_now = sequence.T_w_c(kLater).inverse() * sequence.T_w_c(0);
+    EXPECT_GT(T_then_now.so3().log().norm(), 0.5) << "the thing is seen from another side";
+    const cv::Mat before = sequence.exact_view(0).inverse_depth;
+    const cv::Mat after = sequence.exact_view(kLater).inverse_depth;
+    double change = 0;
+    for (const int u : {5, before.cols - 6})
+      change = std::max<double>(change, std::abs(before.at<float>(5, u) - after.at<float>(5, u)));
+    if (motion == 1) {
+      EXPECT_GT(change, 0.01);
+    } else {
+      EXPECT_LT(change, 1e-5);
+    }
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Scenes, Photometry, testing::ValuesIn(scene_names()));
 
 TEST(RgbdSequence, DepthImageIsTheGeometryUpToItsUnit) {

@@ -193,6 +193,9 @@ TEST(SyntheticSource, WrongParametersAreNamed) {
                   "walkers need ground to walk on, which desk has not");
   EXPECT_IO_ERROR(open_synthetic("descent", {{"plain", "1"}}),
                   "plain panels need walls, which descent has not");
+  EXPECT_IO_ERROR(open_synthetic("turntable", {{"motion", "3"}}), "motion must be between 0 and 2");
+  EXPECT_IO_ERROR(open_synthetic("desk", {{"motion", "1"}}),
+                  "shape, texture and motion are the turntable's, not of desk");
   EXPECT_IO_ERROR(open_synthetic("corridor", {{"walkers", "17"}}), "walkers must be between 0 and 16");
   EXPECT_IO_ERROR(open_synthetic("corridor", {{"flicker", "1"}}), "flicker must be between");
   EXPECT_IO_ERROR(open_synthetic("desk", {{"drop", "0.95"}}), "drop must be between");

@@ -92,11 +92,24 @@ std::string no_object_reason(const ObjectModel& model, const Trajectory& poses) 
       angle / kDegree, kFewSides / kDegree);
 }
 
+/// An object stands in the middle of the images; a table or a room goes on beyond them.
+void note_if_cut_off(const ObjectArguments& arguments, const ObjectSource& source) {
+  constexpr double kMany = 0.2;
+  const double share = source.share_cut_off();
+  if (share <= kMany) return;
+  fmt::print(
+      stderr,
+      "twofold: {}: in {:.0f} % of the frames what is taken for the object reaches the image's border: "
+      "it is more than one thing, the table or the room, or the camera was too near; --depth-cut says "
+      "how far away it may be, --held that it stands on nothing\n",
+      arguments.source, 100 * share);
+}
+
 nlohmann::ordered_json vector_json(const Vector3& x) {
   return {x.x(), x.y(), x.z()};
 }
 
-nlohmann::ordered_json object_json(const ObjectModel& model, const RunResult& result) {
+nlohmann::ordered_json object_json(const ObjectModel& model, const RunResult& result, double cut_off) {
   nlohmann::ordered_json json;
   json["box"] = {{"centre", vector_json(model.box.centre)}, {"size_m", vector_json(model.box.size)}};
   for (const Vector3& axis : model.box.axes) json["box"]["axes"].push_back(vector_json(axis));
@@ -109,6 +122,7 @@ nlohmann::ordered_json object_json(const ObjectModel& model, const RunResult& re
                     {"turned_deg", model.axis->turned / kDegree},
                     {"deviation_m", model.axis->deviation}};
   }
+  json["share_cut_off"] = cut_off;
   json["metric_loops"] = result.mapping.metric_loops;
   json["loops"] = result.loops.size();
   json["surface"] = surface_json(model.figures);
@@ -133,13 +147,14 @@ void print_object(const ObjectModel& model, const RunResult& result) {
              result.loops.size());
 }
 
-void write_object(const ObjectArguments& arguments, const ObjectModel& model, const RunResult& result) {
+void write_object(const ObjectArguments& arguments, const ObjectModel& model, const RunResult& result,
+                  double cut_off) {
   const std::filesystem::path out = arguments.out;
   write_surface(out, model.mesh, model.up);
   TriangleMesh cloud = model.mesh;
   cloud.triangles.clear();
   write_ply_mesh(out / "cloud.ply", cloud);
-  write_file(out / "object.json", text_of_json(object_json(model, result), 2) + "\n");
+  write_file(out / "object.json", text_of_json(object_json(model, result, cut_off), 2) + "\n");
   if (!arguments.picture.empty()) write_png(arguments.picture, draw_object(model));
 }
 
@@ -179,8 +194,9 @@ void run_object(ObjectArguments& arguments) {
   if (model.mesh.triangles.empty())
     throw std::runtime_error(arguments.source + ": " +
                              no_mesh_reason(model.figures, arguments.surface.max_depth));
-  write_object(arguments, model, result);
+  write_object(arguments, model, result, source->share_cut_off());
   print_object(model, result);
+  note_if_cut_off(arguments, *source);
   if (!result.losses.empty()) throw std::runtime_error(fmt::format("{}", fmt::join(result.losses, "; ")));
 }
 
@@ -195,6 +211,9 @@ void add_mask_options(CLI::App& command, ObjectArguments& arguments) {
                   "of the depth [m]")
       ->check(at_least_zero())
       ->capture_default_str();
+  command.add_flag("--held", mask.held,
+                   "The object is held by hand: no plane that it stands on is looked for, and what is nearer "
+                   "than --depth-cut is the object, the hand with it");
   command.add_option("--erode", mask.erode, "Pixels taken away from the rim of what is left")
       ->check(CLI::Range(0, 20))
       ->capture_default_str();

@@ -58,6 +58,7 @@ bool ObjectSource::mask(Frame& frame) {
     reason_ = found.error();
     return false;
   }
+  cut_off_ += reaches_border(*found, options_.mask.erode);
   cv::Mat object(depth.size(), CV_16UC1, cv::Scalar(0));
   depth.copyTo(object, *found);
   if (shown_++ % options_.keep_every == 0) keep(frame, object);
@@ -75,8 +76,7 @@ void ObjectSource::keep(const Frame& frame, const cv::Mat& depth) {
     ++not_kept_;
     return;
   }
-  Kept kept{frame.t_ns, masker_.plane().normal,
-            pack_keyframe_depth(frame.index, depth, colours_.left_image(frame))};
+  Kept kept{frame.t_ns, masker_.up(), pack_keyframe_depth(frame.index, depth, colours_.left_image(frame))};
   kept_bytes_ += kept.images.depth.bytes() + kept.images.colour.bytes();
   kept_.push_back(std::move(kept));
 }
@@ -91,13 +91,18 @@ std::vector<std::string> ObjectSource::left_out() const {
   return all;
 }
 
+double ObjectSource::share_cut_off() const {
+  return shown_ > 0 ? static_cast<double>(cut_off_) / shown_ : 0;
+}
+
 std::string ObjectSource::nothing_shown() const {
   if (shown_ > 0) return {};
   if (reason_.empty()) return "no frame shows an object: there is none";
   const bool is_all = without_object_ < kPatience;
+  const char* const hint = options_.mask.held ? "" : " (--held: of a thing that is held by hand)";
   return (is_all ? "no frame shows an object: "
                  : fmt::format("none of the first {} frames shows an object: ", kPatience)) +
-         reason_;
+         reason_ + hint;
 }
 
 }  // namespace twofold

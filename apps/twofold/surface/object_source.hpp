@@ -49,6 +49,8 @@ class ObjectSource final : public FrameSource {
   /// What was left out, in words: frames without an object, depth beyond max_bytes, colours that cannot be
   /// read.
   [[nodiscard]] std::vector<std::string> left_out() const;
+  /// Share of the frames that show an object in which it reaches the image's border.
+  [[nodiscard]] double share_cut_off() const;
   /// Why no frame shows an object, once the source has ended; empty when one does.
   [[nodiscard]] std::string nothing_shown() const;
 
@@ -64,7 +66,7 @@ class ObjectSource final : public FrameSource {
   ObjectMasker masker_;
   std::vector<Kept> kept_;
   std::size_t kept_bytes_ = 0;
-  int shown_ = 0, without_object_ = 0, not_kept_ = 0;
+  int shown_ = 0, without_object_ = 0, not_kept_ = 0, cut_off_ = 0;
   FrameColours colours_;
   std::string reason_;  ///< of the last frame without an object
 };
