@@ -125,7 +125,7 @@ void plan(const std::stop_token& stop, const twofold::Slam& slam, const twofold:
     if (!pose) continue;
     const twofold::SurfaceSnapshot now = surface.snapshot();
     // Not pose->T_world_camera: a loop may have moved the world since this surface was made.
-    const auto T_world_camera = now.pose_of(*pose, slam.map());
+    const auto T_world_camera = now.camera_pose(*pose, slam.map());
     if (!T_world_camera) continue;
     const SpacePoint ahead = now.at(transform(*T_world_camera, {0, 0, 0.5}));
     std::printf("frame %lld: half a metre ahead is %s\n", static_cast<long long>(pose->frame),
@@ -160,7 +160,7 @@ int run(const std::string& name, const std::string& mesh) {
   planner.join();
   surface.update(slam.map());
   const twofold::SurfaceSnapshot now = surface.snapshot();
-  const auto T_world_camera = last ? now.pose_of(*last) : std::nullopt;
+  const auto T_world_camera = last ? now.camera_pose(*last) : std::nullopt;
   const bool known = T_world_camera && ask_ahead(now, *T_world_camera);
   if (!mesh.empty()) write_mesh(mesh, now.mesh());
   return known ? 0 : 1;

@@ -29,7 +29,7 @@ def main(name: str = "synthetic:desk?sensor=rgbd&frames=60&width=320&height=240"
                 surface.add(frame, pose.frame)
                 surface.update(slam.map())
     now = surface.snapshot()  # for any thread, however long; the surface goes on without it
-    here = (last and now.pose_of(last)) or twofold.Pose()  # in the snapshot's world
+    here = (last and now.camera_pose(last)) or twofold.Pose()  # in the snapshot's world
     metres = np.arange(0, 3, 0.01)
     ahead = now.at(np.array([here @ np.array([0, 0, z]) for z in metres]))
     free = metres[ahead["state"] == twofold.SpaceState.FREE.value]

@@ -274,9 +274,9 @@ void bind_map_surface(py::module_& module) {
   snapshot.def("prepare", &SurfaceSnapshot::prepare, py::call_guard<py::gil_scoped_release>(),
                "Joins the submaps now, unless that was done.");
   snapshot.def(
-      "pose_of",
+      "camera_pose",
       [](const SurfaceSnapshot& self, const PoseEstimate& pose, const MapRows* map) {
-        return self.pose_of(pose, map != nullptr ? map->snapshot : MapSnapshot());
+        return self.camera_pose(pose, map != nullptr ? map->snapshot : MapSnapshot());
       },
       py::arg("pose"), py::arg("map") = nullptr,
       "T_world_camera of a tracked frame in the world that this surface is in, which a correction of the map "

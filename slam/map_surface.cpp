@@ -116,7 +116,7 @@ std::uint32_t SurfaceSnapshot::map_part() const {
   return impl_ ? index(impl_->part) : kNoId;
 }
 
-std::optional<Pose> SurfaceSnapshot::pose_of(const PoseEstimate& pose, const MapSnapshot& map) const {
+std::optional<Pose> SurfaceSnapshot::camera_pose(const PoseEstimate& pose, const MapSnapshot& map) const {
   if (!impl_ || pose.state != TrackingState::kTracked) return std::nullopt;
   const KeyframeId reference{pose.reference_keyframe};
   const auto T_k_w = pose_in_older(impl_->map->graph, map.impl_->map->graph, reference, impl_->part);

@@ -65,7 +65,7 @@ struct SlamOptions {
   bool places = true;
   std::filesystem::path vocabulary = {};  ///< instead of the built-in one
   /// finish ends with a bundle adjustment of the whole map, for one camera, and for a rig that has recognised
-  /// a place, of up to 3,000 keyframes: about a millisecond each.
+  /// a place, of up to 5,000 keyframes: one to two milliseconds each.
   bool global_adjustment = true;
 
   /// Map file that is written again and again during the run, replaced atomically, by a thread that nobody

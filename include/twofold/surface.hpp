@@ -219,7 +219,7 @@ class TWOFOLD_API SurfaceSnapshot {
   ///             most points with it, else by the snapshot's newest
   /// @return  nothing where the frame is lost, in another map part, or its keyframe is in neither map, or was
   ///          culled so long ago that what replaced it is forgotten. O(keyframes beside it).
-  [[nodiscard]] std::optional<Pose> pose_of(const PoseEstimate& pose, const MapSnapshot& map = {}) const;
+  [[nodiscard]] std::optional<Pose> camera_pose(const PoseEstimate& pose, const MapSnapshot& map = {}) const;
   /// Joins the submaps now, unless that was done, here or on a copy. Throws std::bad_alloc when memory ends.
   void prepare() const;
   /// As SurfaceModel::at.

@@ -84,7 +84,7 @@ class Slam(_core.Slam):
     localise_only=False        poses in that map, which does not change
     places=True                recognise places: large loops, lost cameras, map parts
     vocabulary=None            file instead of the built-in one
-    global_adjustment=True     finish() adjusts the whole map of one camera, or of a rig that has recognised a place: about 1 ms a keyframe
+    global_adjustment=True     finish() adjusts the whole map of one camera, or of a rig that has recognised a place: 1 to 2 ms a keyframe
     checkpoint=None            map file that is written again and again during the run
     checkpoint_period=60       from one to the next [s]
     schedule=None              of RunMode.REPLAY: schedule.log of the run to repeat

@@ -164,10 +164,10 @@ def test_a_runs_surface_follows_its_map() -> None:
         before = surface.snapshot().memory_bytes()
         surface.snapshot().prepare()
         assert surface.snapshot().memory_bytes() >= before
-        here = now.pose_of(pose)
+        here = now.camera_pose(pose)
         assert here is not None and np.abs(here.t - pose.T_world_camera.t).max() < 0.02
-        assert early.pose_of(pose) is None, "its keyframe is newer"
-        in_early = early.pose_of(pose, slam.map())
+        assert early.camera_pose(pose) is None, "its keyframe is newer"
+        in_early = early.camera_pose(pose, slam.map())
         assert in_early is not None and np.abs(in_early.t - here.t).max() < 0.05
         assert surface.snapshot(now.map_part).map_version == now.map_version
         assert surface.snapshot(12345).map_part == twofold.NO_ID

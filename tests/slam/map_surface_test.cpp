@@ -198,24 +198,24 @@ TEST_F(MapSurfaceTest, ASnapshotSaysWhereTheCameraIsInItsOwnWorld) {
   const auto early_keyframes = early_map.keyframes();
   const Pose expected = compose(keyframe_of(early_keyframes, early_pose.reference_keyframe).T_world_camera,
                                 early_pose.T_reference_camera);
-  ASSERT_TRUE(early.pose_of(early_pose));
-  expect_near(*early.pose_of(early_pose), expected, 1e-9);
+  ASSERT_TRUE(early.camera_pose(early_pose));
+  expect_near(*early.camera_pose(early_pose), expected, 1e-9);
 
   add_keyframes(1000);
   ASSERT_GT(pose_->reference_keyframe, early_keyframes.back().id);
-  EXPECT_FALSE(early.pose_of(*pose_)) << "a keyframe that it does not know";
-  const auto now = early.pose_of(*pose_, slam_.map());
+  EXPECT_FALSE(early.camera_pose(*pose_)) << "a keyframe that it does not know";
+  const auto now = early.camera_pose(*pose_, slam_.map());
   ASSERT_TRUE(now);
   expect_near(*now, pose_->T_world_camera, 0.03);
-  EXPECT_EQ(early.pose_of(early_pose, slam_.map()), early.pose_of(early_pose));
+  EXPECT_EQ(early.camera_pose(early_pose, slam_.map()), early.camera_pose(early_pose));
 
   PoseEstimate lost = *pose_;
   lost.state = TrackingState::kLost;
-  EXPECT_FALSE(early.pose_of(lost, slam_.map()));
-  EXPECT_FALSE(SurfaceSnapshot().pose_of(*pose_, slam_.map()));
+  EXPECT_FALSE(early.camera_pose(lost, slam_.map()));
+  EXPECT_FALSE(SurfaceSnapshot().camera_pose(*pose_, slam_.map()));
   PoseEstimate unknown = *pose_;
   unknown.reference_keyframe = 1'000'000;
-  EXPECT_FALSE(early.pose_of(unknown, slam_.map()));
+  EXPECT_FALSE(early.camera_pose(unknown, slam_.map()));
 }
 
 /// The lens is covered for a while; places are not recognised, so that what comes then is another part.
@@ -249,8 +249,8 @@ TEST(MapSurface, HasSnapshotsOfEveryMapPart) {
   EXPECT_GT(before.mesh().triangles.size(), 500U);
   EXPECT_NE(before.mesh().positions, surface.snapshot().mesh().positions);
   EXPECT_EQ(surface.snapshot(12345).map_part(), kNoId);
-  EXPECT_TRUE(before.pose_of(*first, slam.map()));
-  EXPECT_FALSE(before.pose_of(*pose, slam.map())) << "in another part";
+  EXPECT_TRUE(before.camera_pose(*first, slam.map()));
+  EXPECT_FALSE(before.camera_pose(*pose, slam.map())) << "in another part";
 }
 
 TEST_F(MapSurfaceTest, SaysWhatIsWrong) {
