@@ -16,6 +16,8 @@ MapperOptions without_budget(const MapperOptions& options) {
   MapperOptions all = options;
   all.max_points = std::numeric_limits<int>::max();
   all.solver.max_iterations = options.global.max_iterations;
+  all.solver.initial_damping = options.global.initial_damping;
+  all.solver.relative_decrease = options.global.relative_decrease;
   return all;
 }
 

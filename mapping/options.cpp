@@ -42,6 +42,8 @@ std::string GlobalAdjustmentOptions::invalid_reason() const {
   return OptionCheck()
       .at_least("max_keyframes", max_keyframes, 0)
       .at_least("max_iterations", max_iterations, 1)
+      .at_least("initial_damping", initial_damping, 0)
+      .at_least("relative_decrease", relative_decrease, 0)
       .at_least("rounds", rounds, 1)
       .reason();
 }

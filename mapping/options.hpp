@@ -73,6 +73,11 @@ struct GlobalAdjustmentOptions {
   int max_keyframes = 5000;  ///< maps of more keep what windows and pose graph gave them, >= 0
   int max_iterations = 10;   ///< Levenberg-Marquardt steps a round, accepted or not, >= 1
   int rounds = 2;            ///< after each, what disagrees is removed, >= 1
+  // Instead of those of WindowSolverOptions: what bends a long way, or changes its unit from one end to the
+  // other, hardly changes the cost, of which a large map has much. It takes steps that are hardly damped, and
+  // all of them.
+  double initial_damping = 1e-8;    ///< >= 0
+  double relative_decrease = 1e-9;  ///< >= 0
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -97,9 +97,9 @@ int main(int argc, char** argv) {
   app.add_option("--max-keyframes", options.global.max_keyframes, "Larger maps are left alone")
       ->capture_default_str();
   app.add_option("--iterations", options.global.max_iterations, "Steps a round")->capture_default_str();
-  app.add_option("--damping", options.solver.initial_damping, "Of the first step of a round")
+  app.add_option("--damping", options.global.initial_damping, "Of the first step of a round")
       ->capture_default_str();
-  app.add_option("--relative-decrease", options.solver.relative_decrease,
+  app.add_option("--relative-decrease", options.global.relative_decrease,
                  "A step that lowers the cost by less than this share is the last one")
       ->capture_default_str();
   app.add_option("--rounds", options.global.rounds, "Outliers are removed after each")->capture_default_str();
