@@ -12,6 +12,7 @@
 #include "engine/logs/schedule_log.hpp"
 #include "engine/stage_timer.hpp"
 #include "engine/trace.hpp"
+#include "estimation/focal_length.hpp"
 #include "estimation/motion_only.hpp"
 #include "graph/keyframe_database.hpp"
 #include "graph/loop_constraint.hpp"
@@ -124,6 +125,7 @@ struct MappingTotals {
   std::int64_t late_loops = 0;    ///< whose keyframes the map had forgotten, or never had
   /// Adjusted all at once when the run ended (Mapper::adjust_all); 0: nothing called for it.
   std::int64_t globally_adjusted_keyframes = 0;
+  std::optional<FocalLengthEstimate> focal_length;  ///< of one camera, as the adjusted map shows it
 };
 
 /// A loop that was closed by appearance.

@@ -273,7 +273,9 @@ GraphSnapshot MapperRunner::publish() {
 GraphSnapshot MapperRunner::finish() {
   if (may_change_) {
     mapper_.optimise_all_poses();
-    totals_.globally_adjusted_keyframes = mapper_.adjust_all().keyframes;
+    const GlobalAdjustmentReport report = mapper_.adjust_all();
+    totals_.globally_adjusted_keyframes = report.keyframes;
+    totals_.focal_length = report.focal_length;
   }
   tell_of_next_map();
   return publish();

@@ -1,6 +1,8 @@
 #include "mapping/global_adjustment.hpp"
 
+#include <cmath>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "estimation/window_solver.hpp"
@@ -22,9 +24,8 @@ MapperOptions without_budget(const MapperOptions& options) {
 }
 
 /// What each round removes the next one does without.
-void adjust(GraphWriter& writer, const DoubleWindow& window, const Rig& rig, const MapperOptions& options,
-            GlobalAdjustmentReport& report) {
-  WindowBuilder builder(rig, options);
+void adjust(GraphWriter& writer, const DoubleWindow& window, const MapperOptions& options,
+            WindowBuilder& builder, GlobalAdjustmentReport& report) {
   WindowSolver solver;
   std::vector<WindowBuilder::Outlier> outliers;
   for (int round = 0; round < options.global.rounds; ++round) {
@@ -50,6 +51,14 @@ void adjust(GraphWriter& writer, const DoubleWindow& window, const Rig& rig, con
   }
 }
 
+std::optional<FocalLengthEstimate> focal_length_of(WindowProblem& problem, const MapperOptions& options) {
+  const double systematic = options.global.focal_sigma;
+  auto found = estimate_focal_length(problem, options.solver, 2 * systematic);
+  if (!found || found->sigma > systematic) return std::nullopt;
+  found->sigma = std::hypot(found->sigma, found->scale * systematic);
+  return found;
+}
+
 }  // namespace
 
 GlobalAdjustmentReport adjust_all_components(GraphWriter& writer, const Rig& rig,
@@ -62,7 +71,10 @@ GlobalAdjustmentReport adjust_all_components(GraphWriter& writer, const Rig& rig
       return;
     }
     const DoubleWindow window = inner_window_of(tree);
-    adjust(writer, window, rig, all, report);
+    WindowBuilder builder(rig, all);
+    adjust(writer, window, all, builder, report);
+    if (rig.kind == SensorKind::kMono && window.contains(writer.graph().reference()))
+      report.focal_length = focal_length_of(builder.problem(), all);
     marginalise_edges_of(writer, window);
     ++report.components;
     report.keyframes += static_cast<int>(tree.size());

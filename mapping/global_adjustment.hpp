@@ -1,6 +1,9 @@
 #pragma once
 
+#include <optional>
+
 #include "camera/rig.hpp"
+#include "estimation/focal_length.hpp"
 #include "graph/graph_writer.hpp"
 #include "mapping/options.hpp"
 
@@ -14,6 +17,9 @@ struct GlobalAdjustmentReport {
   int outliers = 0;         ///< observations removed
   int too_large = 0;        ///< components left as they were: more keyframes than max_keyframes
   double initial_cost = 0;  ///< of the first round, all components
+  /// Of one camera, as the reference keyframe's component shows it, if it does; sigma includes
+  /// GlobalAdjustmentOptions::focal_sigma. Poses and points are those of the rig's focal length nevertheless.
+  std::optional<FocalLengthEstimate> focal_length;
   double final_cost = 0;  ///< of the last one; fewer observations than initial_cost where there are outliers
 };
 

@@ -45,6 +45,7 @@ std::string GlobalAdjustmentOptions::invalid_reason() const {
       .at_least("initial_damping", initial_damping, 0)
       .at_least("relative_decrease", relative_decrease, 0)
       .at_least("rounds", rounds, 1)
+      .above("focal_sigma", focal_sigma, 0)
       .reason();
 }
 

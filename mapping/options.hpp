@@ -78,6 +78,9 @@ struct GlobalAdjustmentOptions {
   // all of them.
   double initial_damping = 1e-8;    ///< >= 0
   double relative_decrease = 1e-9;  ///< >= 0
+  /// What no statistics see of the focal length that a map of one camera shows, as a share of it, > 0, as in
+  /// SelfCalibrationOptions::systematic_sigma. Where statistics see more than this, the map does not show it.
+  double focal_sigma = 0.01;
 
   /// Empty when valid; otherwise names the field, the rule and the value.
   [[nodiscard]] std::string invalid_reason() const;

@@ -83,6 +83,13 @@ cv::Mat draw_run(const std::string& source_text, const Trajectory& final_poses,
                        plot);
 }
 
+nlohmann::ordered_json focal_length_json(const Rig& rig, const std::optional<FocalLengthEstimate>& of_map) {
+  if (!of_map) return nullptr;
+  return {{"map_px", of_map->scale * rig.camera.fx},
+          {"sigma_px", of_map->sigma * rig.camera.fx},
+          {"contradicts_calibration", of_map->contradicts_rig()}};
+}
+
 nlohmann::ordered_json summary_of(const RunFrames& frames, const FrameSource& source,
                                   const EngineOptions& options, const RunResult& result,
                                   const std::vector<MapPart>& parts, const nlohmann::ordered_json& surface) {
@@ -91,6 +98,7 @@ nlohmann::ordered_json summary_of(const RunFrames& frames, const FrameSource& so
   summary["error"] = fmt::format("{}", fmt::join(frames.errors, "; "));
   summary["scale"] = scale_is_arbitrary(source.rig(), options) ? "arbitrary" : "metric";
   summary["self_calibration"] = frames.calibration;
+  summary["focal_length"] = focal_length_json(source.rig(), result.mapping.focal_length);
   summary["surface"] = surface;
   const auto path_or_null = [](const std::string& file) {
     return file.empty() ? nlohmann::ordered_json(nullptr)
@@ -227,6 +235,11 @@ void print_summary(const std::filesystem::path& folder, const Rig& rig, const En
   if (result.readout && result.readout->significant) {
     fmt::print("readout     {:.1f} +- {:.1f} ms: a rolling shutter, found from {} pairs of frames\n",
                1e3 * result.readout->seconds, 1e3 * result.readout->sigma, result.readout->pairs);
+  }
+  if (const auto& of_map = result.mapping.focal_length; of_map && of_map->contradicts_rig()) {
+    fmt::print(
+        "focal       the map shows a focal length of {:.1f} +- {:.1f} px, the calibration says {:.1f}\n",
+        of_map->scale * rig.camera.fx, of_map->sigma * rig.camera.fx, rig.camera.fx);
   }
   print_other_maps(options, result, parts);
   print_times(options, result);

@@ -83,6 +83,10 @@ void adjust(const std::string& file, const Trajectory& truth, MapperOptions opti
       "{:.6g}\n",
       report.keyframes, report.components, report.too_large, report.points, report.observations,
       report.outliers, report.initial_cost, report.final_cost);
+  if (report.focal_length)
+    fmt::print("focal length: {:.1f} px +- {:.2f} %, {:.4f} times that of the map\n",
+               report.focal_length->scale * map.rig.camera.fx, 100 * report.focal_length->sigma,
+               report.focal_length->scale);
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "fixtures/graph_invariants.hpp"
 #include "mapping/edges.hpp"
 #include "tests/mapping/spiral_rounds.hpp"
@@ -98,6 +100,35 @@ TEST(GlobalAdjustmentOfOneCamera, ComesAtTheEndOfEveryRun) {
   const GlobalAdjustmentReport report = mapper.adjust_all();
   EXPECT_EQ(report.keyframes, 60);
   EXPECT_LT(report.final_cost, report.initial_cost);
+  EXPECT_FALSE(report.focal_length) << "straight down all the way: a longer one is a higher spiral";
+}
+
+/// The spiral, the camera nodding.
+Simulation nodding_spiral() {
+  std::vector<SE3> path = simulation::spiral_path(60, 0.2, 0.8, 1.2);
+  const std::vector<Vector3> points = simulation::scattered_points(path, 2, 25, 5);
+  for (std::size_t k = 0; k < path.size(); ++k)
+    path[k] = SE3(SO3::exp({0.4 * std::sin(0.15 * static_cast<double>(k)), 0, 0}), Vector3::Zero()) * path[k];
+  simulation::Options options;
+  options.rig = simulation::thesis_rig(SensorKind::kMono);
+  options.seed = 5;
+  options.max_observations = 120;
+  return {options, points, path};
+}
+
+/// A map made with a focal length that is wrong by a twentieth: what it shows is the camera's own.
+TEST(GlobalAdjustmentOfOneCamera, ShowsThatTheFocalLengthIsWrong) {
+  Simulation simulation = nodding_spiral();
+  Rig rig = simulation::thesis_rig(SensorKind::kMono);
+  rig.camera.fx *= 1.05;
+  rig.camera.fy *= 1.05;
+  Mapper mapper(rig, tiny_windows());
+  while (!simulation.done()) map_next(simulation, mapper);
+  mapper.optimise_all_poses();
+  const GlobalAdjustmentReport report = mapper.adjust_all();
+  ASSERT_TRUE(report.focal_length);
+  EXPECT_TRUE(report.focal_length->contradicts_rig());
+  EXPECT_NEAR(1.05 * report.focal_length->scale, 1, 2 * report.focal_length->sigma);
 }
 
 TEST(GlobalAdjustmentWithOutliers, RemovesWhatDisagrees) {
