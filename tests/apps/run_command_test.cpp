@@ -451,6 +451,10 @@ TEST_F(RunCommand, OneCameraIsCalibratedByItsOwnVideo) {
   EXPECT_EQ(content(folder_ / "auto/calibration.yaml").find("readout"), std::string::npos);
   EXPECT_GT(found["readout_sigma_ms"].get<double>(), 0);
   EXPECT_GT(summary["globally_adjusted_keyframes"], 0);
+  ASSERT_TRUE(summary["focal_length"].is_object());
+  EXPECT_FALSE(summary["focal_length"]["contradicts_calibration"]);
+  const double of_map = summary["focal_length"]["map_px"];
+  EXPECT_NEAR(of_map, kFocalLength, 3 * summary["focal_length"]["sigma_px"].get<double>());
   const Outcome anew = run(folder_, source + (folder_ / "auto") + "' --calib auto --poses -");
   EXPECT_EQ(anew.exit_code, 0) << "a run may replace what it has found itself: " << anew.err;
   EXPECT_TRUE(anew.out.starts_with("{")) << "standard output has the poses alone: " << anew.out.substr(0, 80);
