@@ -184,7 +184,7 @@ TEST_F(SubmapSurfaceTest, WhatIsSharedIsNotCopiedToBeFusedAnew) {
   limits_.free_space = true;
   SubmapSurface surface(rig_, testing::fine_options(), limits_);
   add_all(surface);
-  const std::vector<SharedSubmap> shared = surface.share(KeyframeId{0});
+  const std::vector<SharedSubmap> shared = surface.share();
   const std::uint64_t revision = shared[0].volume->revision();
   const SE3 T_k_w = writer_.graph().keyframe(KeyframeId{1}).T_k_w;
   writer_.set_pose(KeyframeId{1}, SE3(SO3(), Vector3(0.008, 0, 0)) * T_k_w);
@@ -200,7 +200,7 @@ TEST_F(SubmapSurfaceTest, WhatIsSharedIsNotCopiedToBeFusedAnew) {
 TEST_F(SubmapSurfaceTest, FreeSpaceIsKeptForThoseWhoAskOnly) {
   SubmapSurface without(rig_, testing::fine_options(), limits_);
   add_all(without);
-  const std::vector<SharedSubmap> shared = without.share(KeyframeId{0});
+  const std::vector<SharedSubmap> shared = without.share();
   ASSERT_EQ(shared.size(), 3u);
   for (const SharedSubmap& submap : shared) EXPECT_EQ(submap.free, nullptr);
 }
@@ -228,7 +228,7 @@ class HiddenSpaceTest : public SubmapSurfaceTest {
   }
   /// Whether the first submap has the cell of a position in the world free.
   [[nodiscard]] static bool is_free(SubmapSurface& surface, const Vector3& x_w) {
-    const SharedSubmap first = surface.share(KeyframeId{0}).front();
+    const SharedSubmap first = surface.share().front();
     const Eigen::Vector3i cell = (first.T_w_s.inverse() * x_w / (4 * kVoxel)).array().floor().cast<int>();
     return first.free->contains({cell.x(), cell.y(), cell.z()});
   }
