@@ -170,7 +170,7 @@ def test_a_runs_surface_follows_its_map() -> None:
         in_early = early.camera_pose(pose, slam.map())
         assert in_early is not None and np.abs(in_early.t - here.t).max() < 0.05
         assert surface.snapshot(now.map_part).map_version == now.map_version
-        assert surface.snapshot(12345).map_part == twofold.NO_ID
+        assert surface.snapshot(12345).map_part is None
         with pytest.raises(ValueError, match="number"):
             surface.add(frame, 0)
 
