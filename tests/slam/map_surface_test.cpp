@@ -293,7 +293,7 @@ SurfaceSnapshot surface_of_pair(int rows) {
     std::vector<std::uint8_t> slipped(static_cast<std::size_t>(frame.right.stride * frame.right.height));
     std::copy(right, right + static_cast<std::ptrdiff_t>(slipped.size()) - lower, slipped.begin() + lower);
     frame.right.data = slipped.data();
-    frame.owner = nullptr;
+    const auto owner = std::exchange(frame.owner, nullptr);  // of the left image still; both are copied
     slam.push(frame);
     const auto pose = slam.latest();
     if (pose && pose->keyframe) surface.add(frame, pose->frame);
