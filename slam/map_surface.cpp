@@ -23,7 +23,7 @@ std::string MapSurfaceOptions::invalid_reason() const {
   return OptionCheck().above("memory_mb", memory_mb, 0).reason();
 }
 
-struct SurfaceSnapshot::Impl {
+struct TWOFOLD_HIDDEN SurfaceSnapshot::Impl {
   /// Of all submaps, in the world.
   struct Joined {
     Joined(const SurfaceOptions& options, const std::vector<SharedSubmap>& submaps)
@@ -153,7 +153,7 @@ std::size_t SurfaceSnapshot::memory_bytes() const {
   return impl_ ? impl_->bytes() : 0;
 }
 
-struct MapSurface::Impl {
+struct TWOFOLD_HIDDEN MapSurface::Impl {
   Impl(const MapSnapshot::Impl& map, const SurfaceModelOptions& its_options, const SubmapOptions& limits)
       : rig(expect_depth(map.rig)),
         row_offset(map.row_offset),

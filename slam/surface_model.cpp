@@ -29,7 +29,7 @@ std::string SurfaceModelOptions::invalid_reason() const {
       .reason();
 }
 
-struct SurfaceModel::Impl {
+struct TWOFOLD_HIDDEN SurfaceModel::Impl {
   Impl(const Rig& its_rig, const SurfaceModelOptions& its_options)
       : rig(its_rig),
         options(its_options),
