@@ -161,19 +161,20 @@ struct TWOFOLD_HIDDEN MapSurface::Impl {
         options(surface_options(rig, its_options)),
         submaps(rig, options, limits) {}
 
+  void publish(const std::shared_ptr<const MapVersion>& map);
+  /// What has been counted since the last call.
+  [[nodiscard]] SurfaceUpdate take_counts();
+  void note_bytes() { bytes.store(submaps.bytes(), std::memory_order_relaxed); }
+
   Rig rig;
   std::shared_ptr<const std::atomic<double>> row_offset;  ///< of the run; null: of none
   double min_stereo_depth;
   SurfaceOptions options;
-  void publish(const std::shared_ptr<const MapVersion>& map);
-  /// What has been counted since the last call.
-  [[nodiscard]] SurfaceUpdate take_counts();
-
   SubmapSurface submaps;
   SubmapReport counted;  ///< as far as updates have told
   std::int64_t newest_frame = -1;
   std::uint64_t version = 0;
-  std::atomic<std::size_t> bytes{0};
+  std::atomic<std::size_t> bytes{0};  // of submaps, for other threads. Relaxed: nothing goes with the number
 
   using OfPart = std::shared_ptr<const SurfaceSnapshot::Impl>;
   std::mutex mutex;               // guards what follows, while a pointer is copied or a list exchanged
@@ -242,7 +243,7 @@ void MapSurface::add(const FrameView& frame, std::int64_t number) {
   const DepthFrame images = depth_frame(impl_->rig, frame, matching);
   impl_->submaps.offer(pack_keyframe_depth(number, images.depth, images.colour));
   impl_->newest_frame = number;
-  impl_->bytes = impl_->submaps.bytes();
+  impl_->note_bytes();
 }
 
 SurfaceUpdate MapSurface::update(const MapSnapshot& map) {
@@ -252,7 +253,7 @@ SurfaceUpdate MapSurface::update(const MapSnapshot& map) {
                                 std::to_string(impl_->version));
   impl_->submaps.step(graph);
   impl_->version = graph.version();
-  impl_->bytes = impl_->submaps.bytes();
+  impl_->note_bytes();
   impl_->publish(map.impl_->map);
   return impl_->take_counts();
 }
@@ -270,7 +271,7 @@ SurfaceSnapshot MapSurface::snapshot(std::uint32_t part) const {
 }
 
 std::size_t MapSurface::memory_bytes() const {
-  return impl_->bytes;
+  return impl_->bytes.load(std::memory_order_relaxed);
 }
 
 }  // namespace twofold

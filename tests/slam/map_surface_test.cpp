@@ -119,6 +119,10 @@ TEST_F(MapSurfaceTest, AnswersWhatIsFreeAndWhereTheNextSurfaceIs) {
   ASSERT_GT(others.all, 100);
   EXPECT_LT(others.unknown, 0.5 * others.all);
   EXPECT_LT(others.wrong, 0.02 * others.all);
+  const int all = plain.all + others.all;
+  EXPECT_GT(plain.free + others.free, 0.75 * all);
+  EXPECT_GT(plain.occupied + others.occupied, 0.75 * all);
+  EXPECT_GT(plain.near + others.near, 0.7 * all);
   const auto x = mesh.positions[mesh.positions.size() / 2];
   const DistanceBox box{{x[0] - 0.3, x[1] - 0.3, x[2] - 0.3}, {x[0] + 0.3, x[1] + 0.3, x[2] + 0.3}, 0.05};
   EXPECT_LT(std::abs(now.distances(box).at({x[0], x[1], x[2]}).distance), 0.05);
