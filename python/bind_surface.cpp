@@ -222,7 +222,8 @@ void bind_model(py::module_& module) {
            "free "
            "space is kept as far\nas max_free_depth from the camera [m]; 0: as far as there are readings. "
            "Stereo "
-           "depth is looked for from\nmin_stereo_depth on [m]; 0: from CameraRig.depth_min on. "
+           "depth is looked for from\nmin_stereo_depth on [m]; 0: from CameraRig.depth_min, or 0.4 if that "
+           "is nearer. "
            "Raises ValueError for a rig without depth.")
       .def(
           "add",
