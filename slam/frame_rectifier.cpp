@@ -27,7 +27,7 @@ Calibration usable_calibration(const std::filesystem::path& file, int width, int
   Calibration calibration = read_calibration(folder && left_only ? euroc_sensor_file(file, "cam0") : file);
   if (left_only && calibration.kind != SensorKind::kMono)
     throw IoError(file, "left_only is for folders in EuRoC's layout");
-  if (width > 0 && height > 0) set_missing_size(width, height, &calibration);
+  if (width > 0 && height > 0) set_missing_size(file, width, height, &calibration);
   expect_valid(file, calibration);
   return calibration;
 }

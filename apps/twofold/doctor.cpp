@@ -38,15 +38,11 @@ CaptureFormat with_defaults(CaptureFormat format) {
   return format;
 }
 
-bool is_camera(const SourceSpec& spec) {
-  return spec.scheme == "v4l2" || (spec.scheme.empty() && spec.argument.starts_with("/dev/"));
-}
-
 Wanted wanted_of(const std::string& text) {
   Wanted wanted;
   if (text.empty()) return wanted;
   const SourceSpec spec = parse_source_spec(text);
-  if (!is_camera(spec)) return wanted;
+  if (!spec.is_camera()) return wanted;
   SourceParameters parameters(text, spec.parameters);
   const V4l2FramesOptions options = take_v4l2_options(spec.argument, parameters);
   wanted.cameras.push_back(options.first);
@@ -148,7 +144,7 @@ std::vector<Finding> look_at_images(const DoctorArguments& arguments) {
   constexpr int kLooks = 5;
   constexpr int kApart = 5;  // frames
   if (arguments.source.empty()) return {};
-  if (arguments.calibration.empty() && is_camera(parse_source_spec(arguments.source))) return {};
+  if (arguments.calibration.empty() && parse_source_spec(arguments.source).is_camera()) return {};
   const auto source = open_source(arguments.source, source_options(arguments));
   ImageChecks checks(source->rig());
   Frame frame;

@@ -78,9 +78,11 @@ void export_map(const ExportArguments& arguments) {
   if (parts.empty()) parts.push_back(KeyframeId{0});  // of an empty map: files with nothing in them
   std::vector<MapSnapshot::Point> points;
   if (!arguments.ply.empty()) points = points_with_covariance(map.rig, map.graph);
+  const LengthUnit unit = map.rig.kind == SensorKind::kMono ? LengthUnit::kArbitrary : LengthUnit::kMetre;
   for (std::size_t n = 0; n < parts.size(); ++n) {
     if (!arguments.ply.empty())
-      write_ply(part_file(std::filesystem::path(arguments.ply), n), map_points(points, map.graph, parts[n]));
+      write_ply(part_file(std::filesystem::path(arguments.ply), n), map_points(points, map.graph, parts[n]),
+                unit);
     if (!arguments.tum.empty())
       write_tum_trajectory(part_file(std::filesystem::path(arguments.tum), n),
                            keyframe_trajectory(map.graph, parts[n]));

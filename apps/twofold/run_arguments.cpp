@@ -53,6 +53,10 @@ void expect_consistent(const RunArguments& given) {
   if (given.poses_form != unset.poses_form && given.poses.empty())
     throw IoError("--poses-form", "needs --poses");
   if (given.window != unset.window) throw IoError("--window", "is for --estimator swf (--windows?)");
+  if (given.calibration == "auto" && !given.map.load.empty() && !given.map.localise_only)
+    throw IoError("--calib auto",
+                  "finds other numbers each time, and who goes on with a map needs those that "
+                  "it was made with: --calib calibration.yaml of that run, or --localise-only");
 }
 
 }  // namespace

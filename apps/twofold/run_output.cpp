@@ -65,16 +65,20 @@ cv::Mat draw_run(const std::string& source_text, const Trajectory& final_poses,
                  const Trajectory& causal_poses, const Trajectory& truth, Alignment alignment) {
   PlotOptions plot;
   plot.title = source_text;
-  plot.subtitle = fmt::format("{} poses", final_poses.size());
+  plot.subtitle = fmt::format("{} poses{}", final_poses.size(),
+                              alignment == Alignment::kSim3 ? ", of an arbitrary unit of length" : "");
+  plot.metric = alignment != Alignment::kSim3;
   Trajectory shown = thinned(final_poses);
   Trajectory shown_causal = thinned(causal_poses);
   const auto pairs = associate(final_poses, truth, 10'000'000);
   if (const auto evaluation = evaluate(pairs, {.alignment = alignment})) {
     for (auto& pose : shown) pose.T_w_c = aligned_pose(evaluation->S_w_e, pose.T_w_c);
     for (auto& pose : shown_causal) pose.T_w_c = aligned_pose(evaluation->S_w_e, pose.T_w_c);
-    plot.subtitle = fmt::format("{} poses, {:.1f} m, final ATE {:.4f} m ({:.3f} %)", final_poses.size(),
+    plot.subtitle = fmt::format("{} poses, {:.1f} m, final ATE {:.4f} m ({:.3f} %){}", final_poses.size(),
                                 evaluation->path_length, evaluation->absolute.rmse,
-                                100 * evaluation->absolute.rmse / std::max(evaluation->path_length, 1e-9));
+                                100 * evaluation->absolute.rmse / std::max(evaluation->path_length, 1e-9),
+                                alignment == Alignment::kSim3 ? ", aligned with scale" : "");
+    plot.metric = true;  // the truth's unit
   }
   plot.up_axis = truth.empty() ? 1 : up_axis_of(truth);
   return draw_top_down({{"ground truth", positions(truth), plot_colours::kTruth, 4, {}},
@@ -128,13 +132,15 @@ void write_run_output(const std::filesystem::path& folder, const RunFrames& fram
   remove_part_files(folder, parts.size());
   const auto points = points_with_covariance(source.rig(), result.graph);
   const std::uint32_t loaded = loaded_keyframe_ids(options);
+  const bool arbitrary = scale_is_arbitrary(source.rig(), options);
+  const LengthUnit unit = arbitrary ? LengthUnit::kArbitrary : LengthUnit::kMetre;
   for (std::size_t n = 0; n < parts.size(); ++n) {
     if (n > 0) write_tum_trajectory(folder / part_file("trajectory", n, ".txt"), parts[n].trajectory);
     const auto [of_loaded_map, own] = loaded_and_own_keyframes(result.graph, parts[n].id, loaded);
     write_tum_trajectory(folder / part_file("keyframes", n, ".txt"), own);
     if (!of_loaded_map.empty())
       write_tum_trajectory(folder / part_file("keyframes_loaded", n, ".txt"), of_loaded_map);
-    write_ply(folder / part_file("map", n, ".ply"), map_points(points, result.graph, parts[n].id));
+    write_ply(folder / part_file("map", n, ".ply"), map_points(points, result.graph, parts[n].id), unit);
     write_file(folder / part_file("edges", n, ".txt"), edge_list(result.graph, parts[n].id));
   }
   write_run_frames(folder / "frames.txt", result, options.pacing.keeps_pace());
@@ -144,7 +150,7 @@ void write_run_output(const std::filesystem::path& folder, const RunFrames& fram
   if (!final_poses.empty()) {
     write_png(folder / "trajectory.png",
               draw_run(frames.source, final_poses, causal_poses, source.ground_truth(),
-                       scale_is_arbitrary(source.rig(), options) ? Alignment::kSim3 : Alignment::kSe3));
+                       arbitrary ? Alignment::kSim3 : Alignment::kSe3));
   }
 }
 

@@ -314,12 +314,17 @@ Calibration read_calibration(const fs::path& file) {
       "has none of the keys 'cameras', 'cam0', 'camera_model', 'camera_matrix' or 'P0:': not a calibration");
 }
 
-void set_missing_size(int width, int height, Calibration* calibration) {
+void set_missing_size(const fs::path& file, int width, int height, Calibration* calibration) {
   for (PinholeCamera* camera : {&calibration->left.pinhole, &calibration->right.pinhole}) {
-    if (camera->width == 0 && camera->height == 0) {
-      camera->width = width;
-      camera->height = height;
-    }
+    if (camera->width != 0 || camera->height != 0) continue;
+    camera->width = width;
+    camera->height = height;
+    if (!camera->contains({camera->cx, camera->cy}))
+      throw IoError(file,
+                    fmt::format("the camera's centre, cx = {:.6g} and cy = {:.6g}, is not in the images, "
+                                "which are {}x{}: the numbers are of others (in a calibration file "
+                                "that says its size any centre near the image will do)",
+                                camera->cx, camera->cy, width, height));
   }
 }
 

@@ -55,8 +55,9 @@ struct EurocCamera {
 /// which is a `camera_model`.
 [[nodiscard]] const char* distortion_name(DistortionModel model);
 
-/// Fills in a size that the calibration file did not state.
-void set_missing_size(int width, int height, Calibration* calibration);
+/// Fills in a size that the calibration file did not state. Throws IoError with the file's name when the
+/// camera's centre lies outside of such an image: the numbers are of larger ones.
+void set_missing_size(const std::filesystem::path& file, int width, int height, Calibration* calibration);
 
 /// Throws IoError with the file's name when the calibration cannot be used (negative focal length, size
 /// missing, ...).

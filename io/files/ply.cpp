@@ -32,18 +32,19 @@ constexpr std::size_t kShortBytes =
     3 * sizeof(double) + 3 + sizeof(float);  // without the last two properties
 constexpr std::size_t kPointBytes = kShortBytes + 2 * sizeof(std::uint32_t);
 
-std::string header(std::size_t points, bool is_short) {
+std::string header(std::size_t points, bool is_short, LengthUnit unit) {
   return fmt::format(
-      "ply\nformat binary_little_endian 1.0\ncomment metres\nelement vertex {}\n"
+      "ply\nformat binary_little_endian 1.0\ncomment {}\nelement vertex {}\n"
       "property double x\nproperty double y\nproperty double z\n"
       "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float stddev\n{}end_header\n",
-      points, is_short ? "" : "property uint first_keyframe\nproperty uint observers\n");
+      unit == LengthUnit::kMetre ? "metres" : "an arbitrary unit of length", points,
+      is_short ? "" : "property uint first_keyframe\nproperty uint observers\n");
 }
 
 }  // namespace
 
-void write_ply(const std::filesystem::path& file, std::span<const PlyPoint> points) {
-  std::string bytes = header(points.size(), false);
+void write_ply(const std::filesystem::path& file, std::span<const PlyPoint> points, LengthUnit unit) {
+  std::string bytes = header(points.size(), false, unit);
   bytes.reserve(bytes.size() + points.size() * kPointBytes);
   for (const PlyPoint& point : points) {
     for (const double x : point.x_w) append(x, &bytes);
@@ -65,7 +66,11 @@ std::vector<PlyPoint> read_ply(const std::filesystem::path& file) {
   const bool is_short = std::string_view(bytes).substr(0, begin).find("first_keyframe") == std::string::npos;
   const std::size_t point_bytes = is_short ? kShortBytes : kPointBytes;
   const std::size_t count = (bytes.size() - begin) / point_bytes;
-  if (bytes.size() != begin + count * point_bytes || bytes.compare(0, begin, header(count, is_short)) != 0)
+  const auto is_header = [&](LengthUnit unit) {
+    return bytes.compare(0, begin, header(count, is_short, unit)) == 0;
+  };
+  if (bytes.size() != begin + count * point_bytes ||
+      !(is_header(LengthUnit::kMetre) || is_header(LengthUnit::kArbitrary)))
     throw IoError(file.string(), "is no PLY file of this program, or damaged");
   std::vector<PlyPoint> points(count);
   const char* at = bytes.data() + begin;

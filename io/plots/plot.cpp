@@ -79,8 +79,9 @@ std::string tick_text(double value, double step) {
   return fmt::format("{:.{}f}", std::abs(value) < 0.01 * step ? 0.0 : value, decimals);
 }
 
-void draw_grid(cv::Mat& canvas, const Axes& axes, int up_axis) {
-  const auto [a, b] = paper_axes(up_axis);
+void draw_grid(cv::Mat& canvas, const Axes& axes, const PlotOptions& options) {
+  const auto [a, b] = paper_axes(options.up_axis);
+  const char* const unit = options.metric ? " [m]" : "";
   const cv::Point top_right(axes.origin.x + axes.inside.width, axes.origin.y - axes.inside.height);
   const double step = tick_step((axes.max - axes.min).maxCoeff());
   for (double v = std::ceil(axes.min.x() / step) * step; v <= axes.max.x(); v += step) {
@@ -94,9 +95,9 @@ void draw_grid(cv::Mat& canvas, const Axes& axes, int up_axis) {
     put_text(canvas, tick_text(v, step), {axes.origin.x - kSuper * 10, y + kSuper * 5}, 0.45, Anchor::kRight);
   }
   cv::rectangle(canvas, {axes.origin.x, axes.origin.y}, top_right, kInk, kSuper);
-  put_text(canvas, fmt::format("{} [m]", "xyz"[a]),
+  put_text(canvas, fmt::format("{}{}", "xyz"[a], unit),
            {axes.origin.x + axes.inside.width / 2, axes.origin.y + kSuper * 50}, 0.5, Anchor::kCentre);
-  put_text(canvas, fmt::format("{} [m]", "xyz"[b]),
+  put_text(canvas, fmt::format("{}{}", "xyz"[b], unit),
            {kSuper * 12, axes.origin.y - axes.inside.height - kSuper * 12}, 0.5, Anchor::kLeft);
 }
 
@@ -204,7 +205,7 @@ cv::Mat draw_top_down(const std::vector<PlotTrack>& tracks, const PlotOptions& o
                axes.inside.width + kSuper * (kLeftMargin + (has_bar ? kBarMargin : kRightMargin)));
   const int height = axes.inside.height + kSuper * (kTopMargin + kBottomMargin);
   cv::Mat canvas(height, width, CV_8UC3, kWhite);
-  draw_grid(canvas, axes, options.up_axis);
+  draw_grid(canvas, axes, options);
   for (const PlotTrack& track : tracks) {
     if (!track.x_w.empty()) draw_track(canvas, axes, track, options.up_axis);
   }

@@ -70,8 +70,8 @@ BagSource::BagSource(std::unique_ptr<BagReader> reader, const std::filesystem::p
   if (cameras_.kind() != SensorKind::kMono) pairer_.emplace(max_gap_ns);
   grey_bits_ = survey.grey_bits;
   if (grey_bits_ < 16) notes_.push_back(grey_levels_note(file_.string(), grey_bits_));
-  set_missing_size(survey.first.cols, survey.first.rows, &used);
   const std::filesystem::path calibration_file = calibration.value_or(file_);
+  set_missing_size(calibration_file, survey.first.cols, survey.first.rows, &used);
   expect_valid(calibration_file, used);
   expect_size(file_, survey.first, used.left.pinhole, size_of_calibration(calibration_file));
   try {

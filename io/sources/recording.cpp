@@ -19,6 +19,7 @@ namespace fs = std::filesystem;
 
 namespace {
 constexpr double kSupposedFocalLength = 1000;  // [px]
+constexpr double kSupposedBaseline = 0.1;      // [m]
 
 void take_intrinsics(bool from_file, SourceParameters& parameters, PinholeCamera& camera) {
   const bool supposed = !from_file && parameters.suppose_camera();
@@ -28,9 +29,10 @@ void take_intrinsics(bool from_file, SourceParameters& parameters, PinholeCamera
        {std::pair{"fx", &camera.fx}, {"fy", &camera.fy}, {"cx", &camera.cx}, {"cy", &camera.cy}}) {
     const auto given = parameters.take_number(key);
     if (!given && !from_file && !supposed) {
-      throw IoError(
-          parameters.subject(),
-          fmt::format("no calibration: give --calib FILE or fx, fy, cx, cy ('{}' is missing)", key));
+      throw IoError(parameters.subject(),
+                    fmt::format("no calibration: give --calib FILE or fx, fy, cx, cy ('{}' is missing); "
+                                "--calib auto finds one camera's lens",
+                                key));
     }
     if (!given) continue;
     if (std::string_view(key) == "fy" && *given < 0)
@@ -68,6 +70,10 @@ Calibration with_parameters(Calibration base, bool from_file, SensorKind kind, S
     calibration.already_rectified = calibration.left.distortion.is_identity();
   } else if (kind == SensorKind::kStereo && !right_in_file && parameters.left_only()) {
     calibration.kind = SensorKind::kMono;
+  } else if (kind == SensorKind::kStereo && !from_file && parameters.suppose_camera()) {
+    calibration.right = calibration.left;
+    calibration.T_right_left = SE3(SO3(), Vector3(-kSupposedBaseline, 0, 0));
+    calibration.already_rectified = true;  // images come as they are
   } else if (kind == SensorKind::kStereo && !from_file) {
     throw IoError(parameters.subject(), "no calibration: stereo needs the parameter 'baseline'");
   }
@@ -163,7 +169,7 @@ void PlaybackSource::take_size(const cv::Mat& first) {
   const std::string by_calibration = size_of_calibration(recording_.calibration_file);
   left_said_by_ = calibration.left.pinhole.width == 0 ? by_image : by_calibration;
   right_said_by_ = calibration.right.pinhole.width == 0 ? by_image : by_calibration;
-  set_missing_size(first.cols, first.rows, &calibration);
+  set_missing_size(recording_.calibration_file, first.cols, first.rows, &calibration);
 }
 
 Frame PlaybackSource::decode(const RecordedFrame& files) const {

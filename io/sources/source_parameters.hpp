@@ -15,6 +15,10 @@ struct SourceSpec {
   std::string scheme;    ///< empty for a bare path
   std::string argument;  ///< path, scene or device
   std::map<std::string, std::string> parameters;
+
+  [[nodiscard]] bool is_camera() const {
+    return scheme == "v4l2" || (scheme.empty() && argument.starts_with("/dev/"));
+  }
 };
 
 /// Splits a source text. An existing path is never split. Throws IoError on a parameter without '=', an empty

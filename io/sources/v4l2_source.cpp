@@ -29,8 +29,8 @@ void V4l2Source::set_up_calibration(SourceParameters& parameters, const SourceOp
   Calibration base;
   if (options.calibration) base = read_calibration(*options.calibration);
   Calibration used = with_parameters(base, options.calibration.has_value(), frames_.kind(), parameters);
-  set_missing_size(frames_.width(), frames_.height(), &used);
   const std::filesystem::path file = options.calibration.value_or(parameters.subject());
+  set_missing_size(file, frames_.width(), frames_.height(), &used);
   expect_valid(file, used);
   const PinholeCamera& camera = used.left.pinhole;
   if (camera.width != frames_.width() || camera.height != frames_.height()) {

@@ -56,7 +56,7 @@ VideoSource::VideoSource(const std::filesystem::path& file,
   fps_ = fps.value_or(capture_.get(cv::CAP_PROP_FPS));
   if (!(fps_ > 0) || !std::isfinite(fps_)) fps_ = used.fps;
   if (!(fps_ > 0) || !std::isfinite(fps_)) throw IoError(file, "has no frame rate: give the parameter fps");
-  set_missing_size(width, height, &used);
+  set_missing_size(calibration_file, width, height, &used);
   expect_valid(calibration_file, used);
   if (used.left.pinhole.width != width || used.left.pinhole.height != height) {
     throw IoError(file, fmt::format("the images are {}x{}, the calibration is for {}x{}", width, height,

@@ -1,4 +1,6 @@
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
 
 #include <fmt/format.h>
 
@@ -60,6 +62,41 @@ TEST(CalibrateCommand, FolderOfPairsBecomesACalibrationThatCanBeRead) {
   EXPECT_EQ(few.exit_code, 1);
   EXPECT_NE(few.err.find("no calibration: too few views: 5"), std::string::npos) << few.err;
   EXPECT_FALSE(std::filesystem::exists(folder / "few.yaml"));
+}
+
+/// Each pair of images for as long as somebody holds the board still.
+void write_side_by_side(const ScratchFolder& folder, const std::string& name) {
+  constexpr int kHeld = 12;  // frames
+  cv::VideoWriter writer;
+  for (int n = 0; n < 16; ++n) {
+    cv::Mat both;
+    cv::hconcat(cv::imread(folder / fmt::format("set/left/{:02}.png", n)),
+                cv::imread(folder / fmt::format("set/right/{:02}.png", n)), both);
+    if (n == 0)
+      writer.open(folder / name, cv::CAP_FFMPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25,
+                  both.size());
+    for (int i = 0; i < kHeld; ++i) writer.write(both);
+  }
+}
+
+TEST(CalibrateCommand, AVideoOfTheBoardIsReadAsACamera) {
+  const ScratchFolder folder;
+  const CameraModel left = test_camera(460, 324.3, 237.1, -0.28, 0.074, 0.0002, -0.0004);
+  const CameraModel right = test_camera(457, 315.6, 243.8, -0.27, 0.069, -0.0003, 0.0003);
+  render_pairs(folder, left, right, SE3(SO3(), Vector3(-0.06, 0, 0)));
+  write_side_by_side(folder, "pair.avi");
+  const std::string video = "calibrate '" + (folder / "pair.avi") + "?layout=side-by-side'";
+  const Outcome stereo =
+      run(folder, video + " --views 10 --board chessboard:9x6:0.025 -o " + (folder / "stereo.yaml"));
+  ASSERT_EQ(stereo.exit_code, 0) << stereo.err;
+  const Calibration calibration = read_calibration(folder / "stereo.yaml");
+  EXPECT_EQ(calibration.kind, SensorKind::kStereo);
+  EXPECT_EQ(calibration.left.pinhole.width, 640);
+  EXPECT_NEAR(calibration.left.pinhole.fx, 460, 2);
+  EXPECT_NEAR(calibration.T_right_left.translation().x(), -0.06, 0.0006);
+  expect_bad_input(
+      run(folder, "calibrate synthetic:desk --board chessboard:9x6:0.025 -o " + (folder / "c.yaml")),
+      "calibrate reads cameras (v4l2:), videos, and folders of images");
 }
 
 TEST(CalibrateCommand, BadInputIsOneLineAndExitCodeTwo) {

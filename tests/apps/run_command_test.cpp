@@ -320,6 +320,8 @@ TEST_F(RunCommand, WrongOptionsAreOneLineAndExitCodeTwo) {
   expect_bad_input(run_recording("--window 20"), "--window: is for --estimator swf");
   expect_bad_input(run_recording("--estimator swf --window -1"), "--window: must be a number >= 0, is -1");
   expect_bad_input(run_recording("--late drop"), "--late: needs a pace");
+  expect_bad_input(run_recording("--camera mono --calib auto --load-map m.tfm"),
+                   "--calib auto: finds other numbers each time");
   expect_bad_input(run_recording("--late drop --deterministic"), "--late: needs a pace");
   expect_bad_input(run_recording("--replay-schedule /nonexistent"), "/nonexistent");
   expect_bad_input(run_recording("--calib /nonexistent.yaml"), "/nonexistent.yaml");
@@ -463,6 +465,26 @@ TEST_F(RunCommand, OneCameraIsCalibratedByItsOwnVideo) {
   EXPECT_EQ(again.exit_code, 0) << again.err;
 }
 
+TEST_F(RunCommand, OneCamerasLengthsAreNotCalledMetres) {
+  ASSERT_EQ(run(folder_,
+                "run 'synthetic:desk?frames=40&width=320&height=240' --camera mono --deterministic "
+                "--out '" +
+                    (folder_ / "result") + "'")
+                .exit_code,
+            0);
+  EXPECT_NE(result("map.ply").find("comment an arbitrary unit of length\n"), std::string::npos);
+  ASSERT_EQ(run_recording("--deterministic").exit_code, 0);
+  EXPECT_NE(result("map.ply").find("comment metres\n"), std::string::npos);
+}
+
+TEST_F(RunCommand, ACameraWhoseCentreIsOutsideOfTheImagesIsRefused) {
+  for (const char* name : {"P0", "P1"})
+    replace_in("calib.txt", name + std::string(": 220 0 159.5"), name + std::string(": 220 0 601.9"));
+  expect_bad_input(
+      run_recording("--camera mono"),
+      "calib.txt: the camera's centre, cx = 601.9 and cy = 119.5, is not in the images, which are 320x240");
+}
+
 TEST_F(RunCommand, SomebodysCalibrationInTheOutputFolderIsNotOverwritten) {
   const std::string somebodys =
       "sensor: mono\ncameras:\n  - {size: [64, 48], intrinsics: [50, 50, 32, 24]}\n";
@@ -476,6 +498,13 @@ TEST_F(RunCommand, SomebodysCalibrationInTheOutputFolderIsNotOverwritten) {
   refused();
   ASSERT_EQ(run_recording("--deterministic").exit_code, 0);
   refused();  // a run has left its mark there, but did not write this file
+}
+
+TEST_F(RunCommand, ACalibrationThatIsLeftOfARefusedRunIsReplaced) {
+  fs::create_directories(folder_.path() / "result");
+  folder_.write("result/calibration.yaml", "sensor: mono\nquality:\n  board: none, the video itself\n");
+  const Outcome outcome = run_recording("--camera mono --calib auto");
+  EXPECT_EQ(outcome.err.find("would be overwritten"), std::string::npos) << outcome.err;
 }
 
 TEST_F(RunCommand, WhatDoesNotShowTheCalibrationIsRefused) {

@@ -33,6 +33,7 @@ def check(folder: Path, *names: str) -> None:
         jsonschema.Draft202012Validator.check_schema(schema)
         written = json.loads((folder / f"{name}.json").read_text())
         jsonschema.validate(written, schema, cls=jsonschema.Draft202012Validator)
+        assert set(written) <= set(schema["properties"]), f"{name}: {set(written) - set(schema['properties'])} is described nowhere"
 
 
 with tempfile.TemporaryDirectory() as folder:

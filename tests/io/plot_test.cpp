@@ -75,6 +75,14 @@ TEST(Ply, WritesHeaderAndPoints) {
   EXPECT_IO_ERROR(write_ply("/nonexistent/m.ply", points), "cannot be written");
 }
 
+TEST(Ply, SaysTheUnitOfLength) {
+  const ScratchFolder folder;
+  const PlyPoint points[] = {{Vector3(1, 2, 3), {10, 20, 30}, 0.5f}};
+  write_ply(folder.path() / "m.ply", points, LengthUnit::kArbitrary);
+  EXPECT_EQ(bytes_of(folder.path() / "m.ply").find("metres"), std::string::npos);
+  EXPECT_EQ(read_ply(folder.path() / "m.ply").size(), 1U);
+}
+
 TEST(Ply, ReadsFilesOfTheTimeBeforePointsHadFirstKeyframes) {
   const ScratchFolder folder;
   std::string bytes =

@@ -47,8 +47,9 @@ BoardCalibrator collect(FrameSource& source, const CalibrationRequest& request, 
                         const std::function<void(const std::string&)>& say) {
   const Rig& rig = source.rig();
   const bool stereo = rig.kind == SensorKind::kStereo;
+  const bool somebody_moves = source.is_live() || request.video;
   BoardCalibrator calibrator(
-      {request.board, rig.camera.width, rig.camera.height, stereo, source.is_live(), request.views});
+      {request.board, rig.camera.width, rig.camera.height, stereo, somebody_moves, request.views});
   std::string said;
   while (!stop.load(std::memory_order_relaxed)) {  // relaxed: it carries no other data
     Frame frame;
@@ -57,7 +58,7 @@ BoardCalibrator collect(FrameSource& source, const CalibrationRequest& request, 
     if (status == FrameStatus::kEnd) break;
     calibrator.look(view_of(stereo ? Sensor::kStereo : Sensor::kMono, frame));
     if (std::string text = calibrator.progress(); text != said) say(said = std::move(text));
-    if (source.is_live() && calibrator.complete()) break;
+    if (somebody_moves && calibrator.complete()) break;
   }
   return calibrator;
 }

@@ -15,10 +15,11 @@ struct CalibrationRequest {
   int views = 20;              ///< wanted from a camera, 10 to 200
   std::filesystem::path out;   ///< calibration file to write
   std::filesystem::path plot;  ///< picture of the residuals to write
+  bool video = false;          ///< the frames follow each other as a camera's do
 };
 
-/// Shows a source's frames to a BoardCalibrator until nothing is missing (a camera), the source ends or
-/// `stop` is set; calibrates; writes the calibration file and the picture of its residuals.
+/// Shows a source's frames to a BoardCalibrator until nothing is missing (a camera or a video), the source
+/// ends or `stop` is set; calibrates; writes the calibration file and the picture of its residuals.
 ///
 /// @param source  of raw images
 /// @param say  hears a line for the person with the board whenever it changes

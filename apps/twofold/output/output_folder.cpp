@@ -36,11 +36,12 @@ bool is_of_a_run(const fs::path& folder) {
   return !earlier_summary(folder).is_null() || load_schedule(folder / "schedule.log").has_value();
 }
 
-/// That a run found by itself, and nobody has replaced since.
-bool is_own_calibration(const fs::path& folder) {
+/// That a run found by itself, and nobody has replaced since. It may be all that is left of a run that was
+/// refused afterwards.
+bool is_found_calibration(const fs::path& folder) {
   std::ifstream file(folder / kCalibrationName);
   const std::string text(std::istreambuf_iterator<char>(file), {});
-  return is_of_a_run(folder) && text.find(kCalibratedByVideo) != std::string::npos;
+  return text.find(kCalibratedByVideo) != std::string::npos;
 }
 
 }  // namespace
@@ -74,17 +75,19 @@ void expect_place_for_file(const fs::path& file, const std::string& option) {
 
 void expect_place_for_calibration(const fs::path& folder) {
   std::error_code error;
-  if (!fs::exists(fs::symlink_status(folder / kCalibrationName, error)) || is_own_calibration(folder)) return;
+  if (!fs::exists(fs::symlink_status(folder / kCalibrationName, error)) || is_found_calibration(folder))
+    return;
   throw IoError(
       folder / kCalibrationName,
-      "would be overwritten by what --calib auto finds, and no run into this folder has found it: name "
-      "another folder for --out, or move the file");
+      "would be overwritten by what --calib auto finds, and is not what a run has found: name another folder "
+      "for --out, or move the file");
 }
 
 void remove_earlier_run(const fs::path& folder, const fs::path& calibration) {
   std::error_code error;
   const fs::path own = folder / kCalibrationName;
-  if (is_own_calibration(folder) && !fs::equivalent(own, calibration, error)) fs::remove(own, error);
+  if (is_of_a_run(folder) && is_found_calibration(folder) && !fs::equivalent(own, calibration, error))
+    fs::remove(own, error);
   for (const char* name : kResults) fs::remove(folder / name, error);
   for (const std::string name : kLogs) {
     fs::remove(folder / name, error);
