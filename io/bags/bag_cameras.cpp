@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "base/bytes.hpp"
-#include "camera/opencv_distortion.hpp"
+#include "camera/camera_info.hpp"
 
 namespace twofold {
 namespace {
@@ -149,80 +149,19 @@ bool all_of_one_camera(const std::vector<MergedTopic>& topics) {
   });
 }
 
-/// The pinhole camera of a 3x3 or 3x4 matrix.
-PinholeCamera pinhole_of(const double* matrix, std::size_t columns, const CameraInfoMessage& info) {
-  return {matrix[0],           matrix[columns + 1],          matrix[2],
-          matrix[columns + 2], static_cast<int>(info.width), static_cast<int>(info.height)};
-}
-
-/// Zeros at the end may be left out.
-tl::expected<Distortion, std::string> pinhole_distortion(const std::string& model, std::vector<double> D) {
-  std::size_t used = D.size();
-  while (used > 0 && D[used - 1] == 0) --used;
-  if (used <= 5) {
-    D.resize(5);
-  } else if (model == "rational_polynomial") {
-    D.resize(std::max<std::size_t>(D.size(), 8));
-  }
-  return opencv_distortion(D);
-}
-
-tl::expected<Distortion, std::string> fisheye_distortion(std::vector<double> D) {
-  D.resize(std::max<std::size_t>(D.size(), 4));
-  return equidistant_distortion(D);
-}
-
-/// Zeros alone are no distortion, but of a fisheye, whose image is none of a pinhole even so.
-Distortion distortion_of(const CameraInfoMessage& info) {
-  const std::string& model = info.distortion_model;
-  const bool fisheye = model == "equidistant" || model == "fisheye";
-  const bool zero = std::all_of(info.D.begin(), info.D.end(), [](double k) { return k == 0; });
-  if (info.D.empty() || (zero && !fisheye)) return {};
-  tl::expected<Distortion, std::string> distortion = tl::make_unexpected("is not known");
-  if (fisheye) distortion = fisheye_distortion(info.D);
-  if (model == "plumb_bob" || model == "rational_polynomial") distortion = pinhole_distortion(model, info.D);
-  if (!distortion)
-    throw MalformedBytes("camera_info: the distortion '" + model + "' " + distortion.error() +
-                         ": give --calib");
-  return *distortion;
+/// What the numbers of a CameraInfo came to, or the way out in words.
+template <class T>
+T usable(tl::expected<T, std::string> found) {
+  if (!found) throw MalformedBytes("camera_info: " + found.error() + ": give --calib");
+  return *std::move(found);
 }
 
 CameraModel model_of(const BagCamera& camera, const CameraInfoMessage& info) {
   constexpr std::uint32_t kLargestSide = 1U << 16;
   if (info.width > kLargestSide || info.height > kLargestSide)
     throw MalformedBytes("camera_info of '" + camera.images.name + "' has an impossible size");
-  if (camera.rectified()) return {pinhole_of(info.P.data(), 4, info), {}};
-  return {pinhole_of(info.K.data(), 3, info), distortion_of(info)};
-}
-
-SO3 rotation_of(const CameraInfoMessage& info) {
-  const Matrix3 R = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(info.R.data());
-  constexpr double kTolerance = 1e-3;
-  if (!R.allFinite() || (R * R.transpose() - Matrix3::Identity()).norm() > kTolerance || R.determinant() < 0)
-    throw MalformedBytes(
-        "camera_info has an R that is no rotation: the images' poses are not known; give --calib");
-  return SO3(R);
-}
-
-/// t of P = K' [I | t]: where the origin that a pair's P share lies in this camera, turned as the rectified
-/// one.
-Vector3 shift_of(const CameraInfoMessage& info) {
-  const auto& P = info.P;
-  return {(P[3] - P[2] * P[11]) / P[0], (P[7] - P[6] * P[11]) / P[5], P[11]};
-}
-
-/// From the rectified left camera to the rectified right one; neither need be where their P have the origin.
-Vector3 translation_of(const CameraInfoMessage& left, const CameraInfoMessage& right) {
-  constexpr double kTolerance = 1e-3;  // of the focal length
-  if (!(std::abs(left.P[0] - right.P[0]) <= kTolerance * std::abs(right.P[0])))
-    throw MalformedBytes(
-        fmt::format("camera_info of a pair whose focal lengths differ (P[0]: {:.6g} and {:.6g}), which no "
-                    "rectified pair's do: give --calib",
-                    left.P[0], right.P[0]));
-  Vector3 t = shift_of(right) - shift_of(left);
-  if (!t.allFinite() || t.isZero() || t.norm() > 100)
-    throw MalformedBytes("camera_info of the right camera states no baseline (P[3]): give --calib");
-  return t;
+  if (camera.rectified()) return {rectified_pinhole(info), {}};
+  return usable(raw_camera(info));
 }
 
 /// By how much of its width at most an image's corner is elsewhere in the other camera's image.
@@ -274,7 +213,7 @@ Calibration calibration_of(const BagCameras& cameras, const CameraInfoMessage& l
     throw MalformedBytes("camera_info of '" + cameras.left.images.name + "' is not calibrated: give --calib");
   if (!right) return calibration;
   calibration.right = model_of(*cameras.right, *right);
-  const Vector3 t = translation_of(left, *right);
+  const Vector3 t = usable(rectified_translation(left, *right));
   constexpr double kPure = 1e-4;  // of the baseline; beyond that rows of rectified images are not the same
   if (cameras.left.rectified() && cameras.right->rectified() && t.tail<2>().norm() <= kPure * t.norm()) {
     calibration.already_rectified = true;
@@ -283,7 +222,7 @@ Calibration calibration_of(const BagCameras& cameras, const CameraInfoMessage& l
   }
   // Of a pair of which one camera's images are rectified, that one's are turned already.
   const auto rotation = [](const BagCamera& camera, const CameraInfoMessage& info) {
-    return SE3(camera.rectified() ? SO3() : rotation_of(info), Vector3::Zero());
+    return SE3(camera.rectified() ? SO3() : usable(rectifying_rotation(info)), Vector3::Zero());
   };
   const SE3 T_rect_left = rotation(cameras.left, left), T_rect_right = rotation(*cameras.right, *right);
   calibration.T_right_left = T_rect_right.inverse() * SE3(SO3(), t) * T_rect_left;
@@ -292,8 +231,8 @@ Calibration calibration_of(const BagCameras& cameras, const CameraInfoMessage& l
 
 std::string depth_mismatch(const CameraInfoMessage& left, const CameraInfoMessage& depth) {
   constexpr double kTolerance = 0.01;  // drivers' defaults differ from what the same camera was calibrated to
-  const PinholeCamera K_left = pinhole_of(left.K.data(), 3, left), K = pinhole_of(depth.K.data(), 3, depth);
-  const PinholeCamera P_left = pinhole_of(left.P.data(), 4, left), P = pinhole_of(depth.P.data(), 4, depth);
+  const PinholeCamera K_left = raw_pinhole(left), K = raw_pinhole(depth);
+  const PinholeCamera P_left = rectified_pinhole(left), P = rectified_pinhole(depth);
   const auto says_nothing = [](const PinholeCamera& camera) {
     return !(camera.fx > 0 && camera.fy > 0 && camera.width > 0 && camera.height > 0);
   };

@@ -1,11 +1,10 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
-#include <vector>
 
+#include "camera/camera_info.hpp"
 #include "io/bags/bag_reader.hpp"
 
 namespace twofold {
@@ -25,15 +24,6 @@ struct CompressedImageMessage {
   std::int64_t t_ns = 0;  ///< header.stamp
   std::string format;     ///< "jpeg", "png", "16UC1; compressedDepth" and the like
   std::span<const std::uint8_t> file;
-};
-
-/// sensor_msgs/CameraInfo: raw pixel = K distort(ray, D); rectified pixel = P [R ray; 1].
-struct CameraInfoMessage {
-  std::uint32_t width = 0, height = 0;
-  std::string distortion_model;
-  std::vector<double> D;
-  std::array<double, 9> K{}, R{};  ///< row by row
-  std::array<double, 12> P{};
 };
 
 // All throw MalformedBytes when the message is cut short or its lengths make no sense.
