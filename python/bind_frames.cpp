@@ -10,7 +10,6 @@
 #include "python/bindings.hpp"
 #include "python/frames.hpp"
 #include "python/trajectory.hpp"
-#include "twofold/rectifier.hpp"
 
 namespace twofold::python {
 namespace {
@@ -138,46 +137,11 @@ void bind_source(py::module_& module) {
       .def("__exit__", [](Source& source, const py::args&) { source.stop(); });
 }
 
-void bind_rectifier(py::module_& module) {
-  py::class_<FrameRectifier>(module, "FrameRectifier",
-                             "Makes rectified frames of those that a camera gives, by a calibration file.")
-      .def(py::init<const std::filesystem::path&, int, int, bool>(), py::arg("calibration"),
-           py::arg("width") = 0, py::arg("height") = 0, py::arg("left_only") = false,
-           "calibration: a file, or a folder in EuRoC's layout, which has a file a camera; width, height "
-           "[px]: of the raw\n"
-           "images, for calibrations that do not state it; left_only: of such a folder, the left camera "
-           "alone. Raises\n"
-           "RuntimeError, also for one file of a pair's two.")
-      .def_property_readonly("rig", &FrameRectifier::rig, py::return_value_policy::copy,
-                             "What the rectified frames are of.")
-      .def_property_readonly(
-          "T_rectified_raw", &FrameRectifier::T_rectified_raw,
-          "Pose, a rotation alone, of the calibrated left camera in the one that poses are of:\n"
-          "T_world_raw = pose.T_world_camera @ rectifier.T_rectified_raw.")
-      .def(
-          "rectify",
-          [](const FrameRectifier& self, const PythonFrame& raw) {
-            const py::gil_scoped_release unlocked;
-            return PythonFrame{self.rectify(raw.view), {}};
-          },
-          py::arg("raw"),
-          "Grey images, and depth. Raises ValueError when the frame is not of the calibrated cameras.")
-      .def(
-          "rectify_in_colour",
-          [](const FrameRectifier& self, const PythonFrame& raw) {
-            const py::gil_scoped_release unlocked;
-            return PythonFrame{self.rectify_in_colour(raw.view), {}};
-          },
-          py::arg("raw"),
-          "The same, with the left image in colour (blue, green, red) if `raw` has it so: for surfaces.");
-}
-
 }  // namespace
 
 void bind_frames(py::module_& module) {
   bind_frame(module);
   bind_source(module);
-  bind_rectifier(module);
 }
 
 }  // namespace twofold::python

@@ -20,6 +20,7 @@ void bind_estimates(pybind11::module_& module);
 void bind_evaluation(pybind11::module_& module);
 void bind_frames(pybind11::module_& module);
 void bind_calibration(pybind11::module_& module);
+void bind_rectifier(pybind11::module_& module);
 void bind_map(pybind11::module_& module);
 void bind_surface(pybind11::module_& module);
 void bind_slam(pybind11::module_& module);

@@ -9,6 +9,7 @@ PYBIND11_MODULE(_core, module) {
   twofold::python::bind_evaluation(module);
   twofold::python::bind_frames(module);
   twofold::python::bind_calibration(module);
+  twofold::python::bind_rectifier(module);
   twofold::python::bind_map(module);
   twofold::python::bind_surface(module);
   twofold::python::bind_slam(module);

@@ -32,14 +32,6 @@ CalibratedCamera camera_of(const CameraFit& fit) {
   return camera;
 }
 
-CameraModel model_of(const CalibratedCamera& camera) {
-  CameraModel model;
-  model.pinhole = {camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height};
-  model.distortion.model = DistortionModel::kRadTan;
-  std::copy(camera.distortion.begin(), camera.distortion.end(), model.distortion.coefficients.begin());
-  return model;
-}
-
 double focal_std(const CalibratedCamera& camera) {
   return std::max(camera.fx_std, camera.fy_std);
 }
@@ -155,14 +147,10 @@ BoardCalibration BoardCalibrator::calibrate() const {
 }
 
 void save_calibration(const BoardCalibration& calibration, const std::filesystem::path& file) {
-  Calibration written;
-  written.kind = calibration.right ? SensorKind::kStereo : SensorKind::kMono;
-  written.left = model_of(calibration.left);
+  const Calibration written = to_calibration(calibration);
   CalibrationQuality quality{calibration.board, calibration.left.views, calibration.rms_px,
                              focal_std(calibration.left), std::nullopt};
   if (calibration.right) {
-    written.right = model_of(*calibration.right);
-    written.T_right_left = to_se3(calibration.T_right_left);
     quality.focal_std_px = std::max(quality.focal_std_px, focal_std(*calibration.right));
     quality.baseline_std = calibration.baseline_std;
   }

@@ -1,12 +1,14 @@
 #include "slam/conversions.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
-#include "camera/calibration.hpp"
+#include "camera/camera_info.hpp"
 
 namespace twofold {
 namespace {
@@ -43,6 +45,47 @@ SensorKind kind_of(Sensor sensor) {
   throw std::invalid_argument("rig.sensor must be one of Sensor's values");
 }
 
+CameraInfoMessage message_of(const CameraInfo& info) {
+  return {static_cast<std::uint32_t>(info.width),
+          static_cast<std::uint32_t>(info.height),
+          info.distortion_model,
+          info.D,
+          info.K,
+          info.R,
+          info.P};
+}
+
+template <class T>
+T usable(tl::expected<T, std::string> found, const char* whose) {
+  if (!found) throw std::invalid_argument(std::string(whose) + found.error());
+  return *std::move(found);
+}
+
+CameraModel model_of(const CameraInfo& info, const char* whose) {
+  const auto& K = info.K;
+  if (K[1] != 0 || K[3] != 0 || K[6] != 0 || K[7] != 0 || K[8] != 1)
+    throw std::invalid_argument(
+        fmt::format("{}K must be [fx, 0, cx, 0, fy, cy, 0, 0, 1], is [{}]", whose, fmt::join(K, ", ")));
+  return usable(raw_camera(message_of(info)), whose);
+}
+
+Calibration pair_of(const CameraInfo& left, const CameraInfo& right, const SE3& T_right_left) {
+  Calibration calibration;
+  calibration.kind = SensorKind::kStereo;
+  calibration.left = model_of(left, "left camera: ");
+  calibration.right = model_of(right, "right camera: ");
+  calibration.T_right_left = T_right_left;
+  return calibration;
+}
+
+CameraModel model_of(const CalibratedCamera& camera) {
+  CameraModel model;
+  model.pinhole = {camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height};
+  model.distortion.model = DistortionModel::kRadTan;
+  std::copy(camera.distortion.begin(), camera.distortion.end(), model.distortion.coefficients.begin());
+  return model;
+}
+
 }  // namespace
 
 Pose to_pose(const SE3& T_a_b) {
@@ -54,6 +97,14 @@ Pose to_pose(const SE3& T_a_b) {
 SE3 to_se3(const Pose& T_a_b) {
   const auto& q = T_a_b.q;
   return {SO3(Eigen::Quaterniond(q[3], q[0], q[1], q[2])), Vector3(T_a_b.t[0], T_a_b.t[1], T_a_b.t[2])};
+}
+
+bool is_rigid_motion(const Pose& T_a_b) {
+  constexpr double kTolerance = 0.01;  // of the quaternion's length
+  const auto& [x, y, z, w] = T_a_b.q;
+  const double length = std::hypot(std::hypot(x, y), std::hypot(z, w));
+  return std::isfinite(T_a_b.t[0]) && std::isfinite(T_a_b.t[1]) && std::isfinite(T_a_b.t[2]) &&
+         std::abs(length - 1) <= kTolerance;
 }
 
 CameraRig to_camera_rig(const Rig& rig) {
@@ -91,6 +142,41 @@ Rig to_rig(const CameraRig& rig) {
   inside.depth_min = rig.depth_min;
   inside.depth_max = rig.depth_max;
   return inside;
+}
+
+Calibration to_calibration(const CameraInfo& camera, Sensor sensor) {
+  if (sensor != Sensor::kMono && sensor != Sensor::kRgbd)
+    throw std::invalid_argument("one camera is Sensor::kMono or kRgbd; a stereo pair needs two");
+  Calibration calibration;
+  calibration.kind = sensor == Sensor::kRgbd ? SensorKind::kRgbd : SensorKind::kMono;
+  calibration.left = model_of(camera, "left camera: ");
+  return calibration;
+}
+
+Calibration to_calibration(const CameraInfo& left, const CameraInfo& right) {
+  const CameraInfoMessage of_left = message_of(left), of_right = message_of(right);
+  const Vector3 t = usable(rectified_translation(of_left, of_right), "pair: ");
+  const SE3 T_rect_left(usable(rectifying_rotation(of_left), "left camera: "), Vector3::Zero());
+  const SE3 T_rect_right(usable(rectifying_rotation(of_right), "right camera: "), Vector3::Zero());
+  return pair_of(left, right, T_rect_right.inverse() * SE3(SO3(), t) * T_rect_left);
+}
+
+Calibration to_calibration(const CameraInfo& left, const CameraInfo& right, const Pose& T_right_left) {
+  if (!is_rigid_motion(T_right_left))
+    throw std::invalid_argument(
+        fmt::format("T_right_left must have finite numbers and a unit quaternion, is q [{}], t [{}]",
+                    fmt::join(T_right_left.q, ", "), fmt::join(T_right_left.t, ", ")));
+  return pair_of(left, right, to_se3(T_right_left));
+}
+
+Calibration to_calibration(const BoardCalibration& board) {
+  Calibration calibration;
+  calibration.kind = board.right ? SensorKind::kStereo : SensorKind::kMono;
+  calibration.left = model_of(board.left);
+  if (!board.right) return calibration;
+  calibration.right = model_of(*board.right);
+  calibration.T_right_left = to_se3(board.T_right_left);
+  return calibration;
 }
 
 Pose compose(const Pose& T_a_b, const Pose& T_b_c) {

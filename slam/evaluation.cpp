@@ -16,14 +16,6 @@
 namespace twofold {
 namespace {
 
-bool is_rigid_motion(const Pose& pose) {
-  constexpr double kTolerance = 0.01;  // of the quaternion's length, as of trajectory files
-  const bool finite = std::all_of(pose.t.begin(), pose.t.end(), [](double x) { return std::isfinite(x); });
-  const auto& [x, y, z, w] = pose.q;
-  const double length = std::hypot(std::hypot(x, y), std::hypot(z, w));
-  return finite && std::abs(length - 1) <= kTolerance;
-}
-
 Trajectory to_trajectory(const std::vector<StampedPose>& poses) {
   Trajectory trajectory;
   for (const StampedPose& pose : poses) {

@@ -32,6 +32,15 @@ Calibration usable_calibration(const std::filesystem::path& file, int width, int
   return calibration;
 }
 
+/// Checks them, too.
+Rectifier rectifier_of(const Calibration& calibration) {
+  try {
+    return Rectifier(calibration);
+  } catch (const std::runtime_error& error) {
+    throw std::invalid_argument(error.what());
+  }
+}
+
 void expect_pixels(const char* name, const ImageView& view, bool depth) {
   if (const std::string why = pixels_refusal(name, view, depth); !why.empty())
     throw std::invalid_argument(why);
@@ -45,8 +54,7 @@ cv::Mat usable_image(const char* name, const FrameView& frame, const ImageView& 
 }  // namespace
 
 struct TWOFOLD_HIDDEN FrameRectifier::Impl {
-  explicit Impl(const Calibration& calibration)
-      : rectifier(calibration), rig(to_camera_rig(rectifier.rig())) {}
+  explicit Impl(Rectifier made) : rectifier(std::move(made)), rig(to_camera_rig(rectifier.rig())) {}
 
   Rectifier rectifier;
   CameraRig rig;
@@ -54,7 +62,15 @@ struct TWOFOLD_HIDDEN FrameRectifier::Impl {
 
 FrameRectifier::FrameRectifier(const std::filesystem::path& calibration, int width, int height,
                                bool left_only)
-    : impl_(std::make_unique<Impl>(usable_calibration(calibration, width, height, left_only))) {}
+    : impl_(std::make_unique<Impl>(Rectifier(usable_calibration(calibration, width, height, left_only)))) {}
+FrameRectifier::FrameRectifier(const CameraInfo& camera, Sensor sensor)
+    : impl_(std::make_unique<Impl>(rectifier_of(to_calibration(camera, sensor)))) {}
+FrameRectifier::FrameRectifier(const CameraInfo& left, const CameraInfo& right)
+    : impl_(std::make_unique<Impl>(rectifier_of(to_calibration(left, right)))) {}
+FrameRectifier::FrameRectifier(const CameraInfo& left, const CameraInfo& right, const Pose& T_right_left)
+    : impl_(std::make_unique<Impl>(rectifier_of(to_calibration(left, right, T_right_left)))) {}
+FrameRectifier::FrameRectifier(const BoardCalibration& calibration)
+    : impl_(std::make_unique<Impl>(rectifier_of(to_calibration(calibration)))) {}
 FrameRectifier::~FrameRectifier() = default;
 FrameRectifier::FrameRectifier(FrameRectifier&&) noexcept = default;
 FrameRectifier& FrameRectifier::operator=(FrameRectifier&&) noexcept = default;

@@ -126,6 +126,53 @@ def test_rectifiers_follow_the_calibration(stereo_yaml: Path) -> None:
         twofold.FrameRectifier("nowhere.yaml")
 
 
+def info_of(model: str, D: list[float]) -> twofold.CameraInfo:
+    return twofold.CameraInfo(width=64, height=48, K=[50, 0, 31.5, 0, 51, 23.5, 0, 0, 1], D=D, distortion_model=model)
+
+
+def test_a_rectifier_of_numbers_is_that_of_their_file(tmp_path: Path) -> None:
+    left = info_of("plumb_bob", [-0.2, 0.03, 0.001, -0.002, 0.01])
+    right = info_of("equidistant", [0.02, -0.01, 0.003, -0.001])
+    (tmp_path / "pair.yaml").write_text(
+        "sensor: stereo\ncameras:\n"
+        "  - {size: [64, 48], intrinsics: [50, 51, 31.5, 23.5], distortion: {model: radtan, coefficients: [-0.2, 0.03, 0.001, -0.002, 0.01]}}\n"
+        "  - {size: [64, 48], intrinsics: [50, 51, 31.5, 23.5], distortion: {model: equidistant, coefficients: [0.02, -0.01, 0.003, -0.001]}}\n"
+        "T_right_left: [1, 0, 0, -0.1,  0, 1, 0, 0,  0, 0, 1, 0,  0, 0, 0, 1]\n"
+    )
+    from_file = twofold.FrameRectifier(tmp_path / "pair.yaml")
+    from_pose = twofold.FrameRectifier(left, right, T_right_left=twofold.Pose([-0.1, 0, 0], [0, 0, 0, 1]))
+    P = np.array([[52, 0, 32, 0], [0, 52, 24, 0], [0, 0, 1, 0]])
+    shifted = P - [[0, 0, 0, 5.2], [0, 0, 0, 0], [0, 0, 0, 0]]
+    from_messages = twofold.FrameRectifier(
+        *(
+            twofold.CameraInfo(width=64, height=48, K=info.K, D=info.D, distortion_model=info.distortion_model, R=np.eye(3), P=P)
+            for info, P in ((left, P), (right, shifted))
+        )
+    )
+    raw = twofold.Frame(5, grey(48, 64), grey(48, 64)[::-1])
+    expected = from_file.rectify(raw)
+    assert not np.array_equal(expected.left, raw.left)
+    for rectifier in (from_pose, from_messages):
+        assert rectifier.rig.baseline == pytest.approx(0.1)
+        frame = rectifier.rectify(raw)
+        assert frame.right is not None and expected.right is not None
+        np.testing.assert_array_equal(frame.left, expected.left)
+        np.testing.assert_array_equal(frame.right, expected.right)
+    assert twofold.FrameRectifier(left).rig.sensor == twofold.Sensor.MONO
+    assert twofold.FrameRectifier(left, sensor=twofold.Sensor.RGBD).rig.sensor == twofold.Sensor.RGBD
+
+
+def test_numbers_that_make_no_camera_are_refused() -> None:
+    info = info_of("plumb_bob", [0.1])
+    assert (info.K.shape, info.R.shape, info.P.shape, info.D.tolist()) == ((3, 3), (3, 3), (3, 4), [0.1])
+    with pytest.raises(ValueError, match="K must have 9 numbers, has 4"):
+        twofold.CameraInfo(width=64, height=48, K=[50, 51, 31, 23])
+    with pytest.raises(ValueError, match="'plumb_bob' has 6 coefficients"):
+        twofold.FrameRectifier(info_of("plumb_bob", [1, 1, 1, 1, 1, 1]))
+    with pytest.raises(ValueError, match=r"no baseline"):
+        twofold.FrameRectifier(info, info)
+
+
 def test_a_calibrator_says_what_is_missing_and_refuses() -> None:
     calibrator = twofold.BoardCalibrator("chessboard:9x6:0.025", 64, 48)
     assert not calibrator.complete and calibrator.progress
