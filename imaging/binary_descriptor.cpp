@@ -11,6 +11,7 @@
 #include <numbers>
 #include <random>
 
+#include "base/gaussian.hpp"
 #include "imaging/level_pixels.hpp"
 
 namespace twofold {
@@ -20,14 +21,6 @@ constexpr int kDiscRadius = 15;
 constexpr double kPatternSigma = 6.0;
 constexpr double kPatternRadius = 13.0;
 constexpr std::uint32_t kPatternSeed = 20120501;
-
-/// Standard normal by Box and Muller: the standard's distributions differ between libraries, and the pattern
-/// must not.
-double gaussian(std::mt19937& rng) {
-  const double u = (rng() + 1.0) / 4294967297.0;
-  const double v = rng() / 4294967296.0;
-  return std::sqrt(-2.0 * std::log(u)) * std::cos(2.0 * std::numbers::pi * v);
-}
 
 Vector2 draw_in_disc(std::mt19937& rng) {
   for (;;) {
