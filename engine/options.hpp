@@ -16,6 +16,7 @@
 #include "graph/map_file.hpp"
 #include "loopclosure/loop_closer.hpp"
 #include "mapping/mapper.hpp"
+#include "tracking/common/placement.hpp"
 #include "tracking/options.hpp"
 
 namespace twofold {
@@ -68,6 +69,9 @@ struct EngineOptions {
   /// Map to go on with, in which the camera must first be recognised; null: the run starts one. Not destroyed
   /// before the run has ended.
   std::shared_ptr<const SavedMap> map;
+  /// Where in `map` the camera is looked for from the first frame on, beside recognition; none where there is
+  /// no map.
+  std::optional<AssumedPose> assumed_pose;
   bool localise_only = false;  ///< no keyframe is made: `map`, which must be there, does not change
   /// While true no keyframe is made: the map stays as it is, until it is false again. May be null; outlives
   /// the run. A replay takes it from its log.

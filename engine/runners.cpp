@@ -93,7 +93,7 @@ TrackerRunner::TrackerRunner(const Rig& rig, const EngineOptions& options, Trace
   }
   version_counter_ = times_.add_counter("snapshot version");
   effort_counter_ = times_.add_counter("effort level");
-  if (options.map) tracker_.continue_from(options.map->graph);
+  if (options.map) tracker_.continue_from(options.map->graph, options.assumed_pose);
 }
 
 void TrackerRunner::locate(const Frame& frame, const GraphSnapshot& graph, EffortLevel effort,

@@ -142,6 +142,28 @@ void feed(Source& source, SlamWithUpdates& to) {
   }
 }
 
+void bind_initial_pose(py::module_& module) {
+  const InitialPose d;
+  py::class_<InitialPose>(module, "InitialPose",
+                          "Where the camera is in a map made before, as far as somebody knows.")
+      .def(py::init([](const Pose& T_world_camera, std::optional<std::uint32_t> map_part,
+                       double position_sigma, double angle_sigma) {
+             return InitialPose{T_world_camera, map_part.value_or(kNoId), position_sigma, angle_sigma};
+           }),
+           py::arg("T_world_camera"), py::kw_only(), py::arg("map_part") = py::none(),
+           py::arg("position_sigma") = d.position_sigma, py::arg("angle_sigma") = d.angle_sigma,
+           "T_world_camera: of the rectified left camera; map_part: whose world that is, None: the oldest "
+           "part's;\nposition_sigma: standard deviation of each coordinate [m], 0 to 10; angle_sigma: about "
+           "each axis [rad], 0 to 1.")
+      .def_readonly("T_world_camera", &InitialPose::T_world_camera, "Pose of the rectified left camera.")
+      .def_property_readonly(
+          "map_part", [](const InitialPose& self) { return known_id(self.map_part); },
+          "Whose world that is; None: the oldest part's.")
+      .def_readonly("position_sigma", &InitialPose::position_sigma,
+                    "Standard deviation of each coordinate [m].")
+      .def_readonly("angle_sigma", &InitialPose::angle_sigma, "Standard deviation about each axis [rad].");
+}
+
 void bind_push(py::module_& module) {
   py::enum_<PushStatus>(module, "PushStatus", "What became of a frame that was pushed.")
       .value("QUEUED", PushStatus::kQueued, "on its way to the tracker")
@@ -220,17 +242,19 @@ using MaybePath = std::optional<std::filesystem::path>;
 
 std::unique_ptr<SlamWithUpdates, DeleteUnlocked> make_slam(
     const CameraRig& rig, RunMode mode, bool live, double speed, std::optional<LateFrames> late,
-    const MaybePath& map, bool localise_only, bool places, const MaybePath& vocabulary,
-    bool global_adjustment, const MaybePath& checkpoint, double checkpoint_period, const MaybePath& schedule,
-    int inner_window, int outer_window, int frame_buffers, std::optional<int> tracker_cpu,
-    std::optional<int> mapper_cpu, std::optional<int> loop_closer_cpu, std::optional<int> fifo_priority,
-    const MaybePath& run_folder, std::int64_t kept_frames, const MaybePath& trace) {
+    const MaybePath& map, bool localise_only, const std::optional<InitialPose>& initial_pose, bool places,
+    const MaybePath& vocabulary, bool global_adjustment, const MaybePath& checkpoint,
+    double checkpoint_period, const MaybePath& schedule, int inner_window, int outer_window,
+    int frame_buffers, std::optional<int> tracker_cpu, std::optional<int> mapper_cpu,
+    std::optional<int> loop_closer_cpu, std::optional<int> fifo_priority, const MaybePath& run_folder,
+    std::int64_t kept_frames, const MaybePath& trace) {
   const SlamOptions options{mode,
                             live,
                             speed,
                             late,
                             map.value_or(""),
                             localise_only,
+                            initial_pose,
                             places,
                             vocabulary.value_or(""),
                             global_adjustment,
@@ -293,14 +317,15 @@ void define_constructor(SlamClass& slam) {
   slam.def(py::init(&make_slam), py::arg("rig"), py::kw_only(), py::arg("mode") = d.mode,
            py::arg("live") = d.live, py::arg("speed") = d.speed, py::arg("late") = d.late,
            py::arg("map") = py::none(), py::arg("localise_only") = d.localise_only,
-           py::arg("places") = d.places, py::arg("vocabulary") = py::none(),
-           py::arg("global_adjustment") = d.global_adjustment, py::arg("checkpoint") = py::none(),
-           py::arg("checkpoint_period") = d.checkpoint_period, py::arg("schedule") = py::none(),
-           py::arg("inner_window") = d.inner_window, py::arg("outer_window") = d.outer_window,
-           py::arg("frame_buffers") = d.frame_buffers, py::arg("tracker_cpu") = d.tracker_cpu,
-           py::arg("mapper_cpu") = d.mapper_cpu, py::arg("loop_closer_cpu") = d.loop_closer_cpu,
-           py::arg("fifo_priority") = d.fifo_priority, py::arg("run_folder") = py::none(),
-           py::arg("kept_frames") = d.kept_frames, py::arg("trace") = py::none());
+           py::arg("initial_pose") = py::none(), py::arg("places") = d.places,
+           py::arg("vocabulary") = py::none(), py::arg("global_adjustment") = d.global_adjustment,
+           py::arg("checkpoint") = py::none(), py::arg("checkpoint_period") = d.checkpoint_period,
+           py::arg("schedule") = py::none(), py::arg("inner_window") = d.inner_window,
+           py::arg("outer_window") = d.outer_window, py::arg("frame_buffers") = d.frame_buffers,
+           py::arg("tracker_cpu") = d.tracker_cpu, py::arg("mapper_cpu") = d.mapper_cpu,
+           py::arg("loop_closer_cpu") = d.loop_closer_cpu, py::arg("fifo_priority") = d.fifo_priority,
+           py::arg("run_folder") = py::none(), py::arg("kept_frames") = d.kept_frames,
+           py::arg("trace") = py::none());
 }
 
 void define_frames(SlamClass& slam) {
@@ -431,6 +456,7 @@ void bind_slam(py::module_& module) {
       .value("QUEUE", LateFrames::kQueue, "it is tracked: every frame is, however late")
       .value("DROP", LateFrames::kDrop, "it is dropped once leaving work out is not enough")
       .value("NEWEST", LateFrames::kNewest, "it is dropped: the newest one wins");
+  bind_initial_pose(module);
   bind_push(module);
   bind_summary(module);
   py::class_<Updates, std::shared_ptr<Updates>>(module, "Updates")

@@ -1,10 +1,15 @@
 #include "slam/slam_options.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
+#include <fmt/format.h>
+
 #include "base/option_check.hpp"
+#include "graph/part_extraction.hpp"
 #include "loopclosure/default_vocabulary.hpp"
+#include "slam/conversions.hpp"
 
 namespace twofold {
 namespace {
@@ -13,6 +18,16 @@ namespace {
 bool has_folder(const std::filesystem::path& file) {
   const std::filesystem::path folder = file.parent_path();
   return folder.empty() || std::filesystem::is_directory(folder);
+}
+
+void check_initial_pose(const SlamOptions& o, OptionCheck& check) {
+  if (!o.initial_pose) return;
+  const InitialPose& pose = *o.initial_pose;
+  check.rule(!o.map.empty(), "initial_pose needs options.map")
+      .rule(is_rigid_motion(pose.T_world_camera),
+            "initial_pose.T_world_camera must have finite numbers and a unit quaternion")
+      .within("initial_pose.position_sigma", pose.position_sigma, 0, 10)
+      .within("initial_pose.angle_sigma", pose.angle_sigma, 0, 1);
 }
 
 void check_pace(const SlamOptions& o, OptionCheck& check) {
@@ -52,6 +67,17 @@ void check_files(const SlamOptions& o, OptionCheck& check) {
       .rule(has_folder(o.trace), "trace is in a folder that is not there");
 }
 
+AssumedPose assumed_pose(const InitialPose& pose, const GraphSnapshot& map) {
+  if (pose.map_part != kNoId) {
+    const auto parts = parts_of(map);
+    if (std::find(parts.begin(), parts.end(), KeyframeId{pose.map_part}) == parts.end())
+      throw std::invalid_argument(
+          fmt::format("options.initial_pose.map_part is {}, which the map has no part of", pose.map_part));
+  }
+  return {pose.map_part == kNoId ? kNoKeyframe : KeyframeId{pose.map_part}, to_se3(pose.T_world_camera),
+          pose.position_sigma, pose.angle_sigma};
+}
+
 LatePolicy late_policy(const SlamOptions& options) {
   switch (options.late.value_or(options.live ? LateFrames::kNewest : LateFrames::kQueue)) {
     case LateFrames::kQueue:
@@ -80,6 +106,7 @@ std::string SlamOptions::invalid_reason() const {
       .at_least("outer_window", outer_window, 0);
   check_threads(*this, check);
   check_pace(*this, check);
+  check_initial_pose(*this, check);
   check_files(*this, check);
   return check.reason();
 }
@@ -109,6 +136,7 @@ EngineOptions engine_options(const SlamOptions& options) {
         options.vocabulary.empty() ? load_default_vocabulary() : Vocabulary::load(options.vocabulary));
   }
   if (!options.map.empty()) engine.map = std::make_shared<const SavedMap>(load_map(options.map));
+  if (options.initial_pose) engine.assumed_pose = assumed_pose(*options.initial_pose, engine.map->graph);
   return engine;
 }
 

@@ -60,7 +60,9 @@ TrackResult Tracker::step(const Frame& frame, const GraphSnapshot& graph, Keyfra
 
 FrameStep Tracker::locate(const Frame& frame, const GraphSnapshot& graph, KeyframeProposal* free_proposal,
                           EffortLevel effort) {
-  FrameStep step(frame, graph, free_proposal, bounds_of(effort, options_), loss_.lost_frames());
+  // Without a place in the map the camera has no frame before this one that tells how it moves.
+  const int lost_frames = std::max(loss_.lost_frames(), unplaced_ ? 1 : 0);
+  FrameStep step(frame, graph, free_proposal, bounds_of(effort, options_), lost_frames);
   reference_choice_.begin_frame();
   views_.begin_frame();
   loss_.begin_frame(frame.index, frame.t_ns);
@@ -95,6 +97,7 @@ bool Tracker::track(FrameStep& step) {
     return true;
   }
   if (motion_.reference() == kNoKeyframe) {
+    if (search_from_assumed(step)) return true;
     give_up_frame(LostCause::kUnplaced, step.result);
     return false;
   }

@@ -22,6 +22,7 @@
 #include "tracking/keyframes/new_points.hpp"
 #include "tracking/keyframes/reference_choice.hpp"
 #include "tracking/last_frame.hpp"
+#include "tracking/loss/assumed_placements.hpp"
 #include "tracking/loss/earlier_views.hpp"
 #include "tracking/loss/loss_history.hpp"
 #include "tracking/monocular_start.hpp"
@@ -69,7 +70,9 @@ class Tracker {
   /// Goes on with a map made before: the numbers of keyframes and points continue its own, and the camera is
   /// lost until `relocalise` says where in it the camera is, or until a new part is started. To be called
   /// before the first step.
-  void continue_from(const GraphSnapshot& graph);
+  /// @param assumed  where it is looked for meanwhile, from the first frame on; believed as an answer of the
+  ///                 loop closer is, if the search for the map's points finds it there
+  void continue_from(const GraphSnapshot& graph, const std::optional<AssumedPose>& assumed = std::nullopt);
   /// The camera was not placed yet in the map it was to continue in, nor in a new part.
   [[nodiscard]] bool unplaced() const { return unplaced_; }
 
@@ -122,6 +125,7 @@ class Tracker {
   // tracker_loss.cpp: where a lost camera is looked for
   [[nodiscard]] std::optional<Placement> recognised(const FrameStep& step);
   bool search_from_recognised(const Placement& asked, FrameStep& step);
+  bool search_from_assumed(FrameStep& step);
   void leave_other_part(const FrameStep& step);
   [[nodiscard]] std::optional<Placement> placement_of(const GraphSnapshot& graph, KeyframeId id) const;
   /// Of the map; also of keyframes that it has not got yet.
@@ -187,6 +191,7 @@ class Tracker {
 
   LossHistory loss_;
   EarlierViews views_;
+  AssumedPlacements assumed_;
   bool unplaced_ = false;
 
   NewPoints new_points_;

@@ -25,6 +25,19 @@ bool Tracker::search_from_recognised(const Placement& asked, FrameStep& step) {
   return search_from_view(views_.asked().images, views_.asked().corners, start, step);
 }
 
+/// In a map made before: where the camera was said to be.
+bool Tracker::search_from_assumed(FrameStep& step) {
+  for (int tried = 0; tried < AssumedPlacements::kTriesAFrame; ++tried) {
+    const std::optional<Placement> assumed = assumed_.next();
+    if (!assumed) return false;
+    collect_local_map(assumed->reference, step);
+    step.lap(TrackerStage::kCandidates);
+    const SearchStart start{.placement = *assumed, .kind = SearchStart::Kind::kRecognised};
+    if (search_from(start, step) == LostCause::kNone) return true;
+  }
+  return false;
+}
+
 /// Points and seeds of the part in which the camera was, if it was recognised in another one: how the two lie
 /// to each other nobody knows, and none of them can be seen from here.
 void Tracker::leave_other_part(const FrameStep& step) {

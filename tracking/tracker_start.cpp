@@ -2,9 +2,11 @@
 #include "tracking/tracker.hpp"
 
 namespace twofold {
-void Tracker::continue_from(const GraphSnapshot& graph) {
+
+void Tracker::continue_from(const GraphSnapshot& graph, const std::optional<AssumedPose>& assumed) {
   if (graph.keyframe_count() == 0) return;
   proposer_.continue_from(graph);
+  if (assumed) assumed_ = AssumedPlacements(graph, *assumed);
   unplaced_ = true;
 }
 

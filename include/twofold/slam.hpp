@@ -41,6 +41,14 @@ enum class LateFrames : std::uint8_t {
   kNewest  ///< it is dropped: the newest one wins
 };
 
+/// Where the camera is in a map made before, as far as somebody knows: at a dock, where it was put down.
+struct InitialPose {
+  Pose T_world_camera;             ///< of the rectified left camera, as poses are
+  std::uint32_t map_part = kNoId;  ///< whose world that is (PoseEstimate::map_part); kNoId: the oldest part's
+  double position_sigma = 0.05;    ///< standard deviation of each coordinate [m], in [0, 10]
+  double angle_sigma = 0.03;       ///< likewise about each axis [rad], in [0, 1]
+};
+
 struct SlamOptions {
   RunMode mode = RunMode::kThreaded;
   /// Frames are pushed when they are taken, and their times are of CLOCK_MONOTONIC: latency counts from
@@ -61,6 +69,11 @@ struct SlamOptions {
   /// or, after a second, in a map part of its own.
   std::filesystem::path map = {};
   bool localise_only = false;  ///< poses in `map`, which must be given and does not change
+  /// Where in `map` the camera is looked for from the first frame on, beside recognition: there, and then
+  /// around there as far as its deviations say, at four poses a frame, in 60 frames at most. It is believed
+  /// where as much of the map is found as a recognised place must show; a wrong one costs some milliseconds a
+  /// frame, and recognition goes on.
+  std::optional<InitialPose> initial_pose = {};
   /// Recognise places: closes large loops, finds a lost camera, joins map parts. Needed for `map`.
   bool places = true;
   std::filesystem::path vocabulary = {};  ///< instead of the built-in one

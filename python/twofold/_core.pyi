@@ -481,6 +481,19 @@ class LateFrames(_Enum):
     DROP: ClassVar[LateFrames]
     NEWEST: ClassVar[LateFrames]
 
+class InitialPose:
+    def __init__(
+        self, T_world_camera: Pose, *, map_part: int | None = None, position_sigma: float = ..., angle_sigma: float = ...
+    ) -> None: ...
+    @property
+    def T_world_camera(self) -> Pose: ...
+    @property
+    def map_part(self) -> int | None: ...
+    @property
+    def position_sigma(self) -> float: ...
+    @property
+    def angle_sigma(self) -> float: ...
+
 class PushStatus(_Enum):
     QUEUED: ClassVar[PushStatus]
     DROPPED: ClassVar[PushStatus]
@@ -562,6 +575,7 @@ class Slam:
         late: LateFrames | None = None,
         map: str | PathLike[str] | None = None,
         localise_only: bool = False,
+        initial_pose: InitialPose | None = None,
         places: bool = True,
         vocabulary: str | PathLike[str] | None = None,
         global_adjustment: bool = True,

@@ -82,6 +82,7 @@ class Slam(_core.Slam):
     late=None                  LateFrames, with live or speed: what becomes of frames whose turn comes late
     map=None                   map file to go on with
     localise_only=False        poses in that map, which does not change
+    initial_pose=None          InitialPose: where in that map the camera is looked for first, beside recognition
     places=True                recognise places: large loops, lost cameras, map parts
     vocabulary=None            file instead of the built-in one
     global_adjustment=True     finish() adjusts the whole map of one camera, or of a rig that has recognised a place: 1 to 2 ms a keyframe

@@ -196,6 +196,26 @@ def test_a_map_survives_its_file(finished: twofold.Run, tmp_path: Path) -> None:
     assert placed > 20
 
 
+def test_a_camera_begins_where_it_is_said_to_be(finished: twofold.Run, frames: list[twofold.Frame], rig: twofold.CameraRig, tmp_path: Path) -> None:
+    finished.slam.save_map(tmp_path / "desk.tfm")
+
+    def first_pose(T_world_camera: twofold.Pose) -> twofold.PoseEstimate | None:
+        pose = twofold.InitialPose(T_world_camera, position_sigma=0.02, angle_sigma=0.01)
+        assert (pose.map_part, pose.position_sigma, pose.angle_sigma) == (None, 0.02, 0.01)
+        with twofold.Slam(rig, mode=twofold.RunMode.DETERMINISTIC, map=tmp_path / "desk.tfm", localise_only=True, initial_pose=pose) as slam:
+            slam.push(frames[0])
+            return slam.latest()
+
+    there = finished.slam.finish().trajectory.pose(0)
+    found = first_pose(there)
+    assert found is not None and found.tracked
+    np.testing.assert_allclose(found.T_world_camera.t, there.t, atol=0.02)
+    wrong = first_pose(there @ twofold.Pose([0, 0, 0], [0, 1, 0, 0]))
+    assert wrong is not None and wrong.state == twofold.TrackingState.UNPLACED
+    with pytest.raises(ValueError, match="initial_pose needs options.map"):
+        twofold.Slam(rig, initial_pose=twofold.InitialPose(there))
+
+
 def test_the_interpreters_lock_holds_up_neither_feeder_nor_tracker() -> None:
     run = twofold.run(SCENE)
     updates = run.updates()

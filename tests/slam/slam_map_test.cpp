@@ -212,5 +212,74 @@ TEST_F(SlamMapTest, ACameraFindsItselfInASavedMap) {
   EXPECT_THROW(slam.save_map("/nowhere/at.all"), std::runtime_error);
 }
 
+class InitialPoseTest : public SlamMapTest {
+ protected:
+  InitialPoseTest() {
+    Slam slam(rig(), deterministic());
+    push_all(slam);
+    poses_ = slam.finish().poses;
+    slam.save_map(file_);
+  }
+  [[nodiscard]] SlamOptions options(const InitialPose& pose) const {
+    return {.mode = RunMode::kDeterministic, .map = file_, .localise_only = true, .initial_pose = pose};
+  }
+  [[nodiscard]] InitialPose true_pose() const { return {poses_[0].T_world_camera, poses_[0].map_part}; }
+  [[nodiscard]] std::string refusal(const InitialPose& pose) const {
+    try {
+      Slam slam(rig(), options(pose));
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  std::vector<SlamSummary::FinalPose> poses_;
+};
+
+TEST_F(InitialPoseTest, TheFirstFrameIsTrackedWhereTheCameraIsSaidToBe) {
+  Slam slam(rig(), options(true_pose()));
+  push_all(slam, 0, 1);
+  ASSERT_TRUE(slam.latest());
+  EXPECT_EQ(slam.latest()->state, TrackingState::kTracked);
+  EXPECT_EQ(slam.latest()->map_part, poses_[0].map_part);
+  for (const std::size_t axis : {0U, 1U, 2U})
+    EXPECT_NEAR(slam.latest()->T_world_camera.t[axis], poses_[0].T_world_camera.t[axis], 0.02);
+}
+
+TEST_F(InitialPoseTest, AWrongOneIsNotBelievedAndTheCameraIsRecognised) {
+  InitialPose behind = true_pose();
+  behind.T_world_camera = compose(behind.T_world_camera, {{0, 1, 0, 0}, {0, 0, 0}});  // looks back
+  Slam slam(rig(), options(behind));
+  std::vector<PoseEstimate> poses;
+  slam.on_pose([&](const PoseEstimate& pose) { poses.push_back(pose); });
+  push_all(slam);
+  (void)slam.finish();
+  EXPECT_EQ(poses[0].state, TrackingState::kUnplaced);
+  EXPECT_EQ(poses.back().state, TrackingState::kTracked);
+  for (std::size_t n = 0; n < poses.size(); ++n) {
+    if (poses[n].state != TrackingState::kTracked) continue;
+    EXPECT_NEAR(poses[n].T_world_camera.t[2], poses_[n].T_world_camera.t[2], 0.03) << n;
+  }
+}
+
+TEST_F(InitialPoseTest, OneThatMakesNoSenseIsRefused) {
+  EXPECT_EQ(refusal(true_pose()), "");
+  InitialPose pose = true_pose();
+  pose.map_part = 7;
+  EXPECT_NE(refusal(pose).find("initial_pose.map_part is 7"), std::string::npos);
+  pose = true_pose();
+  pose.position_sigma = -1;
+  EXPECT_NE(refusal(pose).find("position_sigma must be in [0, 10], is -1"), std::string::npos)
+      << refusal(pose);
+  pose = true_pose();
+  pose.angle_sigma = std::nan("");
+  EXPECT_NE(refusal(pose).find("angle_sigma"), std::string::npos);
+  pose = true_pose();
+  pose.T_world_camera.q = {};
+  EXPECT_NE(refusal(pose).find("T_world_camera"), std::string::npos);
+  EXPECT_NE(SlamOptions{.initial_pose = true_pose()}.invalid_reason().find("needs options.map"),
+            std::string::npos);
+}
+
 }  // namespace
 }  // namespace twofold

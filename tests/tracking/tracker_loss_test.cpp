@@ -379,6 +379,48 @@ TEST(Tracker, BelievesAnAnswerThatEnoughOfTheMapsPointsSupport) {
   EXPECT_EQ(told_where_it_is(options), TrackStatus::kLost) << "some of those found do not agree";
 }
 
+/// In a map of before, said to be where it is, but for `off`: the frame with which it is tracked; -1: never.
+int placed_after(const SE3& off, double angle_sigma, EffortLevel effort = EffortLevel::kEverything) {
+  const std::vector<Frame>& sequence = frames(SensorKind::kStereo);
+  Odometry odometry(SensorKind::kStereo);
+  for (std::size_t i = 0; i < 20; ++i) odometry.step(sequence[i]);
+  const GraphSnapshot& map = odometry.snapshot();
+  Tracker tracker(test_rig(SensorKind::kStereo, 320, 240), {});
+  tracker.continue_from(map, AssumedPose{kNoKeyframe, (off * true_T_c_w(2)).inverse(), 0, angle_sigma});
+  for (int n = 0; n < 30; ++n) {
+    Frame frame = sequence[2];
+    frame.index = n;
+    frame.t_ns = n * std::int64_t{33'000'000};
+    const std::uint64_t before = allocations();
+    const TrackResult result = tracker.step(frame, map, nullptr, effort);
+    EXPECT_EQ(allocations(), before);
+    if (result.status != TrackStatus::kTracking) {
+      EXPECT_EQ(result.cause, LostCause::kUnplaced);
+      continue;
+    }
+    EXPECT_FALSE(tracker.unplaced());
+    EXPECT_LT((result.T_c_ref * map.T_k_w(result.reference) * true_T_c_w(2).inverse()).log().norm(), 0.01);
+    return n;
+  }
+  return -1;
+}
+
+TEST(Tracker, IsPlacedWithTheFirstFrameWhereItIsSaidToBe) {
+  EXPECT_EQ(placed_after(SE3(), 0), 0);
+  EXPECT_EQ(placed_after({SO3::exp(Vector3(0.01, -0.01, 0)), Vector3(0.01, 0, 0)}, 0), 0);
+}
+
+TEST(Tracker, IsLookedForAroundWhereItIsSaidToBe) {
+  const SE3 off(SO3::exp(Vector3(0.06, -0.08, 0)), Vector3::Zero());
+  EXPECT_EQ(placed_after(off, 0), -1) << "too far away, and nobody said that it may be";
+  const int found = placed_after(off, 0.06);
+  EXPECT_GT(found, 0);
+}
+
+TEST(Tracker, IsNotPlacedWhereItIsNot) {
+  EXPECT_EQ(placed_after({SO3::exp(Vector3(0, 0.8, 0)), Vector3::Zero()}, 0.02), -1);
+}
+
 /// An answer that comes when the camera has been found without it is about a frame long past.
 TEST(Tracker, WhileItKnowsItsWayNoAnswerMovesIt) {
   const std::vector<Frame>& sequence = frames(SensorKind::kStereo);
