@@ -41,6 +41,14 @@ def test_the_stub_describes_what_is_there() -> None:
         assert {member for member in vars(value) if not member.startswith("_")} <= described(classes[name]), name
 
 
+def test_the_stub_has_the_modules_docstrings() -> None:
+    script = Path(__file__).parents[2] / "scripts" / "stub"
+    stub = PACKAGE / "_core.pyi"
+    written = subprocess.run([sys.executable, str(script), str(stub)], capture_output=True, text=True, timeout=60)
+    assert written.returncode == 0, written.stderr
+    assert stub.read_text() == written.stdout, "scripts/stub writes them"
+
+
 def documented(value: object) -> bool:
     """Has a docstring of more than the signatures that pybind11 writes."""
     lines = (getattr(value, "__doc__", None) or "").splitlines()
