@@ -176,8 +176,9 @@ struct RunResult {
   std::optional<ReadoutEstimate> readout;  ///< of a rolling shutter, if the rig left it open
   std::vector<StageRecorder> times;        ///< one a thread
   ScheduleStreams schedule;
-  std::unique_ptr<Trace> trace;               ///< null unless asked for
-  std::vector<std::string> notes;             ///< wishes (pinning, priority) that were not granted
+  std::unique_ptr<Trace> trace;  ///< null unless asked for
+  /// Wishes (pinning, priority) that were not granted; how the rig differs from the loaded map's.
+  std::vector<std::string> notes;
   std::uint64_t keyframes_not_described = 0;  ///< the loop closer's queue was full
   bool interrupted = false;
   /// How often the loop closer told a lost camera where it was when it asked; it may have moved on since.

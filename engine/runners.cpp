@@ -225,6 +225,7 @@ MapperRunner::MapperRunner(const Rig& rig, const EngineOptions& options, Trace* 
   publish_stage_ = times_.add_stage("publish");
   release_stage_ = times_.add_stage("release");
   if (options.map) mapper_.continue_from(options.map->graph);
+  if (options.map) map_note_ = rig_note(rig, options.map->rig);
   tell_of_next_map();
 }
 
@@ -293,8 +294,9 @@ LoopCloserRunner::LoopCloserRunner(const Rig& rig, const EngineOptions& options,
   relocalise_stage_ = times_.add_stage("relocalisation");
   if (options.vocabulary) closer_.emplace(rig, options.vocabulary, options.loop_closer);
   if (closer_ && options.map) {
-    const bool same_pixels = rig_difference(rig, options.map->rig).empty();
-    closer_->continue_from(same_pixels ? options.map->places : places_seen_by(rig.camera, *options.map));
+    const Rig& map_rig = options.map->rig;
+    const bool same_pixels = rig_difference(rig, map_rig).empty() && rig_note(rig, map_rig).empty();
+    closer_->continue_from(same_pixels ? options.map->places : places_seen_by(rig, *options.map));
   }
   if (closer_ && on_places_) on_places_(closer_->places());
 }
@@ -355,6 +357,7 @@ void collect_results(TrackerRunner& tracking, MapperRunner& mapping, LoopCloserR
   result.graph = mapping.finish();
   tracking.place_earlier_frames(result.frames, result.counts);
   mapping.replacement_log().hang_on_live_keyframes(result.frames);
+  if (!mapping.map_note().empty()) result.notes.push_back(mapping.map_note());
   result.row_offset = tracking.row_offset();
   result.recognised = tracking.recognised();
   result.mapping = mapping.totals();

@@ -130,6 +130,9 @@ class MapperRunner {
   [[nodiscard]] const StageRecorder& times() const { return times_; }
   [[nodiscard]] StageRecorder& times() { return times_; }
 
+  /// Of a loaded map that was made with another calibration, what differs; else empty.
+  [[nodiscard]] const std::string& map_note() const { return map_note_; }
+
  private:
   void do_round(std::span<const ProposalHandle> proposals, std::span<const LoopMessage> messages);
   void tell_of_next_map();
@@ -143,6 +146,7 @@ class MapperRunner {
   StageId round_stage_, listener_stage_, publish_stage_, release_stage_;
   std::vector<KeyframeProposal*> proposals_;
   std::vector<LoopConstraint> loops_;
+  std::string map_note_;
 };
 
 /// Whether the map has taken a loop that the mapper was sent: its keyframes, or those that stand for them by

@@ -62,17 +62,25 @@ inline void save_map(const std::filesystem::path& file, const SavedMap& map) {
 /// The same from a stream of `size` bytes; `name` stands in messages.
 [[nodiscard]] SavedMap read_map(std::istream& in, std::uint64_t size, const std::string& name);
 
-/// Empty when measurements of one rig can be used in a map of the other; else what differs, as "baseline
-/// is 0.12, the map's is 0.11". Depth unit and range are the source's own affair: the map is in metres.
+/// A rig that was calibrated again may go on with a map if nothing is seen farther from where it was [px]:
+/// two standard deviations of a match, and what `twofold calibrate` leaves uncertain at an image's edge.
+inline constexpr double kAcceptedShift = 1;
+
+/// Empty when measurements of one rig can be used in a map of the other: same sensor, same size, and nowhere
+/// in the images, up to disparities of a quarter of their width, is anything seen elsewhere by more than
+/// kAcceptedShift. Else what differs, as "baseline is 0.12, the map's is 0.11: ...". Depth unit and range are
+/// the source's own affair: the map is in metres.
 [[nodiscard]] std::string rig_difference(const Rig& rig, const Rig& map_rig);
+/// What differs where that is accepted, and by how much things are seen elsewhere; empty: nothing does.
+[[nodiscard]] std::string rig_note(const Rig& rig, const Rig& map_rig);
 
 /// The same for a camera that is only localised in the map. One camera may have another centre and another
 /// field of view then: what it takes is that a pixel covers the same angle, to a few per cent, because points
 /// are found by how they looked. (ResampledSource makes it so.)
 [[nodiscard]] std::string localisation_difference(const Rig& rig, const Rig& map_rig);
 
-/// The places of a map as another camera would have seen them: the same corners at its pixels, depths of
-/// stereo rigs left out.
-[[nodiscard]] KeyframeDatabase places_seen_by(const PinholeCamera& camera, const SavedMap& map);
+/// The places of a map as another rig would have seen them: the same corners at its pixels, and of rigs of
+/// the map's own kind their depths.
+[[nodiscard]] KeyframeDatabase places_seen_by(const Rig& rig, const SavedMap& map);
 
 }  // namespace twofold

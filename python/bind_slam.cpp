@@ -230,7 +230,9 @@ void bind_summary(py::module_& module) {
       .def_property_readonly("trajectories", &trajectories_of,
                              "The same of every map part, by the part's id.")
       .def_readonly("timings", &SlamSummary::timings, "StageTime of each thread's stages.")
-      .def_readonly("notes", &SlamSummary::notes, "Requested settings that could not be applied.")
+      .def_readonly(
+          "notes", &SlamSummary::notes,
+          "Requested settings that could not be applied; how the rig differs from the loaded map's.")
       .def_readwrite("errors", &SlamSummary::errors, "What went wrong on the way, a sentence each.")
       .def("__repr__", [](const SlamSummary& self) {
         return fmt::format("<Summary of {} frames: {} tracked, {} lost, {} dropped>", self.frames,

@@ -180,7 +180,8 @@ struct SlamSummary {
   };
   std::optional<Readout> readout;
   std::vector<StageTime> timings;
-  std::vector<std::string> notes;  ///< requested settings (pinning, priority) that could not be applied
+  /// Requested settings (pinning, priority) that could not be applied; how the rig differs from the map's.
+  std::vector<std::string> notes;
   /// What went wrong on the way: a callback that threw, a thread that ended, a file that lost something.
   std::vector<std::string> errors;
 };
@@ -208,9 +209,10 @@ class TWOFOLD_API Slam {
   using FrameCallback = std::function<void(const PoseEstimate&, const FrameDetails&)>;
 
   /// Throws std::invalid_argument when rig or options make no sense, naming the field, and std::runtime_error
-  /// when a file cannot be used or the rig is not the map's: size, intrinsics and baseline must be the ones
-  /// it was made with, so that a camera that was calibrated again needs a new map. A processor or priority
-  /// that the system refuses is no error: SlamSummary::notes tells.
+  /// when a file cannot be used or the rig is not the map's. One that was calibrated again is, and
+  /// SlamSummary::notes tells what differs, if its size is the same and nothing is seen by more than a pixel
+  /// elsewhere than with the map's intrinsics and baseline; else the reason has the numbers. A processor or
+  /// priority that the system refuses is no error: SlamSummary::notes tells.
   Slam(const CameraRig& rig, const SlamOptions& options);
   /// Finishes, after end_pace.
   ~Slam();

@@ -962,7 +962,7 @@ class Summary:
         """StageTime of each thread's stages."""
     @property
     def notes(self) -> list[str]:
-        """Requested settings that could not be applied."""
+        """Requested settings that could not be applied; how the rig differs from the loaded map's."""
 
 class Updates:
     def next(self, timeout: float) -> PoseEstimate | MapEvent | None: ...

@@ -388,7 +388,8 @@ TEST_F(MapFileTest, RigsThatDifferAreTold) {
   EXPECT_EQ(rig_difference(rig, rig), "");
   Rig other = rig;
   other.baseline = 0.12;
-  EXPECT_EQ(rig_difference(other, rig), "baseline is 0.12, the map's is 0.11");
+  EXPECT_EQ(rig_difference(other, rig),
+            "baseline is 0.12, the map's is 0.11: things are seen up to 15 px elsewhere, accepted is 1");
   other = rig;
   other.camera.width = 752;
   EXPECT_EQ(rig_difference(other, rig), "images are 752x480, the map's are 640x480");
@@ -405,6 +406,61 @@ TEST_F(MapFileTest, RigsThatDifferAreTold) {
   EXPECT_EQ(rig_difference(other, rig), "");
 }
 
+TEST_F(MapFileTest, ARigThatWasCalibratedAgainIsTheMapsUpToAPixel) {
+  const Rig rig = sample_map(2, 2, 1).rig;
+  EXPECT_EQ(rig_note(rig, rig), "");
+  const auto half_diagonal = [&](double px) { return 1 + px / std::hypot(rig.camera.cx, rig.camera.cy); };
+  const auto judge = [&](const auto& change, double px) {
+    Rig other = rig;
+    change(other, px);
+    return std::pair(rig_difference(other, rig), rig_note(other, rig));
+  };
+  const auto focal = [&](Rig& other, double px) {
+    other.camera.fx *= half_diagonal(px);
+    other.camera.fy *= half_diagonal(px);
+    other.baseline /= half_diagonal(px);  // so that disparities stay
+  };
+  const auto centre = [](Rig& other, double px) { other.camera.cy += px; };
+  const auto baseline = [](Rig& other, double px) { other.baseline *= 1 + px / (0.25 * other.camera.width); };
+  const auto expect = [&](const auto& change, const std::string& name) {
+    const auto [accepted, note] = judge(change, 0.8);
+    EXPECT_EQ(accepted, "");
+    EXPECT_NE(note.find(name), std::string::npos) << note;
+    EXPECT_NE(note.find("up to 0.8 px elsewhere"), std::string::npos) << note;
+    const auto [refused, no_note] = judge(change, 1.2);
+    EXPECT_NE(refused.find(name), std::string::npos) << refused;
+    EXPECT_NE(refused.find("up to 1.2 px elsewhere, accepted is 1"), std::string::npos) << refused;
+    EXPECT_EQ(no_note, "");
+  };
+  expect(focal, "focal length fx");
+  expect(centre, "centre cy");
+  expect(baseline, "baseline");
+}
+
+TEST_F(MapFileTest, PlacesKeepTheirDepthsInTheEyesOfARigThatWasCalibratedAgain) {
+  const SavedMap map = sample_map(20, 100, 13);
+  Rig other = map.rig;
+  other.camera.fx *= 1.001;
+  other.camera.cx += 0.5;
+  other.baseline *= 0.999;
+  const KeyframeDatabase seen = places_seen_by(other, map);
+  int depths = 0;
+  for (std::uint32_t k = 0; k < seen.size(); ++k) {
+    const PlaceAppearance *a = map.places.find(KeyframeId{k}), *b = seen.find(KeyframeId{k});
+    if (a == nullptr) continue;
+    ASSERT_EQ(a->pixels.size(), b->pixels.size());
+    for (std::size_t n = 0; n < a->pixels.size(); ++n) {
+      const StereoPixel before = a->pixels[n].cast<double>(), now = b->pixels[n].cast<double>();
+      EXPECT_EQ(std::isnan(before.z()), std::isnan(now.z()));
+      if (std::isnan(before.z()) || before.x() - before.z() < 1) continue;
+      const Vector3 x = map.rig.unproject(before);
+      EXPECT_LT((other.unproject(now) - x).norm(), 1e-3 * x.norm());
+      ++depths;
+    }
+  }
+  EXPECT_GT(depths, 10);
+}
+
 TEST_F(MapFileTest, OneCameraOfAnotherSensorIsLocalisedAtTheSameAngularResolution) {
   const SavedMap map = sample_map(6, 40, 3);
   Rig other = map.rig;
@@ -414,7 +470,7 @@ TEST_F(MapFileTest, OneCameraOfAnotherSensorIsLocalisedAtTheSameAngularResolutio
   other.camera.fx *= 1.01;
   EXPECT_EQ(localisation_difference(other, map.rig), "");
   EXPECT_NE(rig_difference(other, map.rig), "");
-  const KeyframeDatabase seen = places_seen_by(other.camera, map);
+  const KeyframeDatabase seen = places_seen_by(other, map);
   ASSERT_EQ(seen.size(), map.places.size());
   for (std::uint32_t k = 0; k < seen.size(); ++k) {
     const PlaceAppearance *a = map.places.find(KeyframeId{k}), *b = seen.find(KeyframeId{k});

@@ -212,6 +212,43 @@ TEST_F(SlamMapTest, ACameraFindsItselfInASavedMap) {
   EXPECT_THROW(slam.save_map("/nowhere/at.all"), std::runtime_error);
 }
 
+/// The focal lengths and the principal point of a rig that was calibrated again, which move what is in the
+/// image's corners by some pixels.
+CameraRig calibrated_again(CameraRig rig, double px) {
+  const double scale = 1 + 0.5 * px / std::hypot(rig.cx, rig.cy);
+  rig.fx *= scale;
+  rig.fy *= scale;
+  rig.baseline /= scale;
+  rig.cx += 0.4 * px;
+  return rig;
+}
+
+TEST_F(SlamMapTest, ARigThatWasCalibratedAgainFindsItselfAndIsTold) {
+  {
+    Slam slam(rig(), deterministic());
+    push_all(slam);
+    EXPECT_TRUE(slam.finish().notes.empty());
+    slam.save_map(file_);
+  }
+  for (const bool localise_only : {true, false}) {
+    Slam slam(calibrated_again(rig(), 0.9),
+              {.mode = RunMode::kDeterministic, .map = file_, .localise_only = localise_only});
+    push_all(slam);
+    const SlamSummary summary = slam.finish();
+    EXPECT_GT(summary.tracked, kFrames / 2);
+    EXPECT_EQ(slam.map().parts().size(), 1U) << "it found itself in the map that was loaded";
+    ASSERT_EQ(summary.notes.size(), 1U);
+    EXPECT_NE(summary.notes[0].find("focal length fx is"), std::string::npos) << summary.notes[0];
+  }
+  try {
+    Slam slam(calibrated_again(rig(), 3), {.map = file_});
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("centre cx is"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("accepted is 1"), std::string::npos) << error.what();
+  }
+}
+
 class InitialPoseTest : public SlamMapTest {
  protected:
   InitialPoseTest() {
