@@ -338,6 +338,18 @@ void bind_map_surface(py::module_& module) {
           "and "
           "what was left out.")
       .def(
+          "mesh_changes",
+          [](OfMap& self, std::uint64_t since) {
+            const py::gil_scoped_release unlocked;
+            const std::unique_lock lock(self.mutex);
+            return self.surface.mesh_changes(since);
+          },
+          py::arg("since") = 0,
+          "What changed in the mesh of the camera's map part after that revision, as of the last update: "
+          "SurfaceChanges; of 0 on, all of it. Small specks, which SurfaceSnapshot.mesh leaves out, are "
+          "there. "
+          "What is joined for it takes memory beside memory_mb.")
+      .def(
           "snapshot",
           [](const OfMap& self, const std::optional<std::uint32_t>& part) {
             return part ? self.surface.snapshot(*part) : self.surface.snapshot();

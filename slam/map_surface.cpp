@@ -12,6 +12,7 @@
 #include "slam/distance_field.hpp"
 #include "slam/map_snapshot.hpp"
 #include "slam/surface_pieces.hpp"
+#include "surface/composition.hpp"
 #include "surface/meshing.hpp"
 #include "surface/submaps.hpp"
 #include "twofold/surface.hpp"
@@ -159,22 +160,25 @@ struct TWOFOLD_HIDDEN MapSurface::Impl {
         row_offset(map.row_offset),
         min_stereo_depth(its_options.min_stereo_depth),
         options(surface_options(rig, its_options)),
-        submaps(rig, options, limits) {}
+        submaps(rig, options, limits),
+        composition(options) {}
 
   void publish(const std::shared_ptr<const MapVersion>& map);
   /// What has been counted since the last call.
   [[nodiscard]] SurfaceUpdate take_counts();
-  void note_bytes() { bytes.store(submaps.bytes(), std::memory_order_relaxed); }
+  void note_bytes() { bytes.store(submaps.bytes() + composition.bytes(), std::memory_order_relaxed); }
 
   Rig rig;
   std::shared_ptr<const std::atomic<double>> row_offset;  ///< of the run; null: of none
   double min_stereo_depth;
   SurfaceOptions options;
   SubmapSurface submaps;
-  SubmapReport counted;  ///< as far as updates have told
+  Composition composition;               ///< of the part that the camera was in, for mesh_changes
+  KeyframeId camera_part = kNoKeyframe;  ///< in which the camera was in the last update
+  SubmapReport counted;                  ///< as far as updates have told
   std::int64_t newest_frame = -1;
   std::uint64_t version = 0;
-  std::atomic<std::size_t> bytes{0};  // of submaps, for other threads. Relaxed: nothing goes with the number
+  std::atomic<std::size_t> bytes{0};  // of both, for other threads. Relaxed: nothing goes with the number
 
   using OfPart = std::shared_ptr<const SurfaceSnapshot::Impl>;
   std::mutex mutex;               // guards what follows, while a pointer is copied or a list exchanged
@@ -253,9 +257,17 @@ SurfaceUpdate MapSurface::update(const MapSnapshot& map) {
                                 std::to_string(impl_->version));
   impl_->submaps.step(graph);
   impl_->version = graph.version();
+  if (graph.reference() != kNoKeyframe) impl_->camera_part = graph.part(graph.reference());
   impl_->note_bytes();
   impl_->publish(map.impl_->map);
   return impl_->take_counts();
+}
+
+SurfaceChanges MapSurface::mesh_changes(std::uint64_t since) {
+  Composition& whole = impl_->composition;
+  if (impl_->camera_part != kNoKeyframe) whole.update(impl_->submaps.placed(impl_->camera_part));
+  impl_->note_bytes();
+  return {whole.mesh().revision(), kBlockEdge * impl_->options.voxel, surface_pieces(whole.mesh(), since)};
 }
 
 SurfaceSnapshot MapSurface::snapshot() const {

@@ -267,9 +267,9 @@ struct SurfaceUpdate {
 /// have moved by more than half a voxel are fused anew. Depth images are kept for that, compressed, as long
 /// as their keyframes are in the map.
 ///
-/// Threads: add and update by one at a time; snapshot and memory_bytes by any, always, also meanwhile: they
-/// wait for nobody. Holding a snapshot blocks nobody: `update` copies a shared submap before changing it,
-/// which costs memory.
+/// Threads: add, update and mesh_changes by one at a time; snapshot and memory_bytes by any, always, also
+/// meanwhile: they wait for nobody. Holding a snapshot blocks nobody: `update` copies a shared submap before
+/// changing it, which costs memory.
 class TWOFOLD_API MapSurface {
  public:
   /// @param map  of the run, before its first keyframe: it tells the rig, and which keyframes are a loaded
@@ -295,6 +295,13 @@ class TWOFOLD_API MapSurface {
   /// for each depth image of the submaps that it bent: `fused` and `fused_anew` times. Throws
   /// std::invalid_argument for an older map than that of the last call, std::bad_alloc when memory ends.
   SurfaceUpdate update(const MapSnapshot& map);
+  /// What changed in the mesh of the camera's map part after that revision, as of the last update; of 0 on,
+  /// all of it, as also after the camera came to another part: its cells replace those of the part before.
+  /// The submaps are joined for it, only where one changed, or moved by more than half a voxel: a loop
+  /// changes most pieces, and less than that moves none. Small specks, which SurfaceSnapshot::mesh leaves
+  /// out, are there. The first call joins all, and from then on what is joined takes memory that memory_mb
+  /// does not count. Throws std::bad_alloc when memory ends.
+  [[nodiscard]] SurfaceChanges mesh_changes(std::uint64_t since);
   /// As of the end of the last update, of the map part in which the camera was then; of nothing before the
   /// first. O(1).
   [[nodiscard]] SurfaceSnapshot snapshot() const;
@@ -302,8 +309,9 @@ class TWOFOLD_API MapSurface {
   /// Of nothing where the map has no such part.
   /// @param part  PoseEstimate::map_part
   [[nodiscard]] SurfaceSnapshot snapshot(std::uint32_t part) const;
-  /// Of samples and depth images, at the end of the last call of add or update. While an update lasts, and as
-  /// long as older snapshots are held, what it changes is there twice.
+  /// Of samples and depth images, and of what mesh_changes joined, at the end of the last call of add, update
+  /// or mesh_changes. While an update lasts, and as long as older snapshots are held, what it changes is
+  /// there twice.
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:

@@ -808,6 +808,11 @@ class MapSurface:
         """Takes the newest map: submaps move, and all that waits is fused. A SurfaceUpdate says how much, and what was
         left out.
         """
+    def mesh_changes(self, since: int = 0) -> SurfaceChanges:
+        """What changed in the mesh of the camera's map part after that revision, as of the last update: SurfaceChanges;
+        of 0 on, all of it. Small specks, which SurfaceSnapshot.mesh leaves out, are there. What is joined for it takes
+        memory beside memory_mb.
+        """
     def snapshot(self, part: int | None = None) -> SurfaceSnapshot:
         """As of the end of the last update: a SurfaceSnapshot, of the map part that the camera is in, or of another one
         (PoseEstimate.map_part). Waits for no update.

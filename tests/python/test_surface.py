@@ -161,6 +161,10 @@ def test_a_runs_surface_follows_its_map() -> None:
         ahead = [pose.T_world_camera @ np.array([0, 0, z]) for z in np.arange(0.5, 4, 0.05)]
         assert (now.at(ahead)["state"] == twofold.SpaceState.FREE.value).sum() > 5
         assert now.memory_bytes() > 0 and surface.memory_bytes() > 0
+        changes = surface.mesh_changes()
+        assert changes.cell_size == pytest.approx(8 * 0.04)
+        assert sum(len(piece.mesh.triangles) for piece in changes.pieces) >= len(now.mesh().triangles)
+        assert surface.mesh_changes(changes.revision).pieces == []
         before = surface.snapshot().memory_bytes()
         surface.snapshot().prepare()
         assert surface.snapshot().memory_bytes() >= before

@@ -257,6 +257,44 @@ TEST(MapSurface, HasSnapshotsOfEveryMapPart) {
   EXPECT_FALSE(before.camera_pose(*pose, slam.map())) << "in another part";
 }
 
+/// Triangles of all cells, by the cells' positions.
+using Cells = std::map<std::array<std::int32_t, 3>, std::size_t>;
+
+void take(const SurfaceChanges& changes, Cells& cells) {
+  for (const SurfacePiece& piece : changes.pieces) {
+    cells.erase(piece.cell);
+    if (!piece.mesh.triangles.empty()) cells[piece.cell] = piece.mesh.triangles.size();
+  }
+}
+
+TEST_F(MapSurfaceTest, SaysWhatChangedInItsMesh) {
+  EXPECT_TRUE(surface_.mesh_changes(0).pieces.empty()) << "there is no map yet";
+  Cells followed;
+  std::uint64_t revision = 0;
+  std::size_t told = 0;
+  for (int n = 0; n < 4; ++n) {
+    add_keyframes(2);
+    const SurfaceChanges changes = surface_.mesh_changes(revision);
+    EXPECT_DOUBLE_EQ(changes.cell_size, 8 * kVoxel);
+    EXPECT_GT(changes.revision, revision);
+    revision = changes.revision;
+    told = changes.pieces.size();
+    take(changes, followed);
+  }
+  const SurfaceChanges again = surface_.mesh_changes(revision);
+  EXPECT_EQ(again.revision, revision);
+  EXPECT_TRUE(again.pieces.empty()) << "nothing has changed since";
+  Cells whole;
+  take(surface_.mesh_changes(0), whole);
+  EXPECT_EQ(followed, whole) << "who follows has what there is";
+  EXPECT_LT(told, whole.size()) << "two keyframes do not change all";
+  std::size_t triangles = 0;
+  for (const auto& [cell, count] : whole) triangles += count;
+  const std::size_t in_snapshot = surface_.snapshot().mesh().triangles.size();
+  EXPECT_GE(triangles, in_snapshot) << "small specks are left out there";
+  EXPECT_LT(triangles, 1.1 * static_cast<double>(in_snapshot));
+}
+
 TEST_F(MapSurfaceTest, SaysWhatIsWrong) {
   add_keyframes(1);
   const MapSnapshot early = slam_.map();
