@@ -112,8 +112,8 @@ class TWOFOLD_API MapSnapshot {
   /// Where this version has the camera of a frame that was tracked at any other time: by way of its reference
   /// keyframe, or, when that was culled, of the keyframe that stands for it now. Nothing: the frame was not
   /// tracked; this version does not have its reference keyframe yet, which can be so for the newest frames;
-  /// or that was culled so long ago (thousands of keyframes) that nobody knows what it hung on. Takes a
-  /// microsecond.
+  /// or that was culled before the 128 that were culled last, and no point is anchored in it any more, so
+  /// that nobody knows what it hung on. Takes a microsecond.
   [[nodiscard]] std::optional<CameraPose> camera_pose(const PoseEstimate& estimate) const;
   /// Likewise of a keyframe by its id (PoseEstimate::reference_keyframe).
   [[nodiscard]] std::optional<CameraPose> keyframe_pose(std::uint32_t id) const;
