@@ -29,6 +29,8 @@ constexpr double kReadoutSigmas = 3.5;           // ... and standard deviations 
 constexpr double kFinestReadout = 0.001;         // [s] no camera is known better, as the tracker has it
 constexpr int kTrialIterations = 12;
 constexpr int kJointIterations = 60;
+constexpr int kFollowingIterations = 5;  // of a clip's motion after a step of the lens
+constexpr double kLongestStep = 0.2;     // of the logarithm of the focal length
 
 struct ClipWeights {
   std::vector<double> of_clip;
@@ -84,38 +86,49 @@ double solve_motions(const std::vector<Clip>& clips, const SharedLens& lens,
   return sum;
 }
 
-double cost_of(const std::vector<ClipAdjustment>& clips, const std::vector<ClipMotion>& motions,
-               const SharedLens& lens, const std::vector<double>& weights, const LensPrior& prior) {
+double cost_of(const std::vector<ClipAdjustment>& clips, const SharedLens& lens,
+               const std::vector<double>& weights, const LensPrior& prior) {
   double cost = prior_cost(prior, lens);
-  for (std::size_t c = 0; c < clips.size(); ++c) cost += weights[c] * clips[c].cost(lens, motions[c]);
+  for (std::size_t c = 0; c < clips.size(); ++c) cost += weights[c] * clips[c].cost(lens, clips[c].motion);
   return cost;
 }
 
+/// A step of the lens, and then motions of the clips' own for it: they bend away from the straight line along
+/// which a linear step takes them, so that a focal length that the motion hardly shows would creep instead.
+void take_step(const SharedLens& stepped_lens, const LensVector& step, std::vector<ClipAdjustment>& clips) {
+  for (ClipAdjustment& clip : clips) {
+    clip.motion = clip.stepped(step);
+    (void)clip.solve_motion(stepped_lens, kFollowingIterations);
+  }
+}
+
+/// The lens alone, of which the clips' motions are functions: they are not damped, nor is the lens by them
+/// (variable projection; Golub and Pereyra 2003).
 void solve_all(std::vector<ClipAdjustment>& clips, const std::vector<double>& weights, const LensPrior& prior,
                SharedLens& lens) {
   LevenbergMarquardtDamping damping(1e-3);
-  double cost = cost_of(clips, motions_of(clips), lens, weights, prior);
+  double cost = cost_of(clips, lens, weights, prior);
   for (int i = 0; i < kJointIterations && !damping.exhausted(); ++i) {
     LensMatrix H = prior.information.asDiagonal();
     LensVector g = prior.information.cwiseProduct(prior.mean - values(lens));
     for (std::size_t c = 0; c < clips.size(); ++c) {
-      const LensEquations equations = clips[c].linearise(lens, damping.lambda());
+      const LensEquations equations = clips[c].linearise(lens, 0);
       H += weights[c] * equations.H;
       g += weights[c] * equations.g;
     }
     H.diagonal() *= 1 + damping.lambda();
-    const LensVector step = solve_symmetric(H, g);
+    LensVector step = solve_symmetric(H, g);
+    step *= std::min(1.0, kLongestStep / std::abs(step[0]));
+    std::vector<ClipMotion> before = motions_of(clips);
     const SharedLens candidate = lens.plus(step);
-    std::vector<ClipMotion> motions;
-    for (const ClipAdjustment& clip : clips) motions.push_back(clip.stepped(step));
-    const double next = std::abs(step[0]) < 1 ? cost_of(clips, motions, candidate, weights, prior)
-                                              : std::numeric_limits<double>::infinity();
+    take_step(candidate, step, clips);
+    const double next = cost_of(clips, candidate, weights, prior);
     if (!(next < cost)) {
+      for (std::size_t c = 0; c < clips.size(); ++c) clips[c].motion = std::move(before[c]);
       damping.reject();
       continue;
     }
     lens = candidate;
-    for (std::size_t c = 0; c < clips.size(); ++c) clips[c].motion = std::move(motions[c]);
     damping.accept(1);
     const double decrease = cost - next;
     cost = next;
@@ -233,16 +246,14 @@ bool shows_readout(const SelfCalibration& found) {
 }
 
 std::string refusal_of(const SelfCalibration& found, int width, const SelfCalibrationOptions& options) {
-  const double f = found.lens.f();
-  if (!std::isfinite(f) || !std::isfinite(found.sigma[0]) || f < kShortest * width || f > kLongest * width ||
-      found.sigma[0] > options.max_sigma) {
-    return fmt::format(
-        "the camera's motion does not show its focal length ({:.0f} px +- {:.0f} %, at most {:.0f} % are of "
-        "use): turn it "
-        "to the sides, up and down, and about its optical axis",
-        f, 100 * found.sigma[0], 100 * options.max_sigma);
-  }
-  return {};
+  const double f = found.lens.f(), sigma = found.sigma[0];
+  const bool credible = f >= kShortest * width && f <= kLongest * width && std::isfinite(sigma);
+  if (credible && sigma <= options.max_sigma) return {};
+  const std::string known = credible ? fmt::format(" ({:.0f} px +- {:.0f} %, at most {:.0f} % are of use)", f,
+                                                   100 * sigma, 100 * options.max_sigma)
+                                     : "";
+  return "the camera's motion does not show its focal length" + known +
+         ": turn it to the sides, up and down, and about its optical axis";
 }
 
 }  // namespace

@@ -38,11 +38,12 @@ struct SelfCalibration {
 /// the width).
 ///
 /// Seven focal lengths from 0.4 to 2.6 widths are tried, the motion of each clip solved from two starts, and
-/// all of it adjusted together from the best one, the motion eliminated clip by clip (bundle adjustment;
-/// Triggs et al. 2000, section 6). Corners that disagree with their clip, and clips that disagree with the
-/// others, lose their weight. The standard deviation is the larger one of two: from the corners, widened by
-/// how far the clips' own focal lengths scatter, and from the scatter of gradients over parts of the video
-/// that do not overlap (White's estimate), which sees what is wrong for all corners of a time.
+/// the lens adjusted from the best one, the motions solved anew for each lens (variable projection; Golub and
+/// Pereyra 2003): one system of both creeps where the motion hardly shows the focal length, and ends before
+/// it gets there. Corners that disagree with their clip, and clips that disagree with the others, lose their
+/// weight. The standard deviation is the larger one of two: from the corners, widened by how far the clips'
+/// own focal lengths scatter, and from the scatter of gradients over parts of the video that do not overlap
+/// (White's estimate), which sees what is wrong for all corners of a time.
 ///
 /// Turning shows the focal length, about any axis, with or without translation. Translation alone does not,
 /// in whatever direction: then the standard deviation is large.

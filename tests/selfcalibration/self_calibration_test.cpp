@@ -134,6 +134,24 @@ TEST(SelfCalibration, TranslationAloneIsRefused) {
   }
 }
 
+/// A car that goes straight ahead: its focal length is the bottom of a long, narrow, bent valley of the cost.
+TEST(SelfCalibration, WhereTheMotionHardlyShowsItTheFocalLengthIsFoundAllTheSame) {
+  for (const unsigned seed : {1U, 2U, 3U, 4U}) {
+    ClipWorld world = world_of(380);
+    world.seed = seed;
+    world.turn = 0.05;
+    world.way = {0.02, 0, 0.4};
+    world.noise_px = 0.03;
+    world.clips = 16;
+    SelfCalibrationOptions whatever;
+    whatever.max_sigma = 1;
+    const auto found = self_calibrate(simulate_clips(world), kWidth, kHeight, whatever);
+    ASSERT_TRUE(found) << seed << ": " << found.error();
+    EXPECT_LT(std::abs(found->lens.log_f - world.lens.log_f), 3 * found->sigma[0])
+        << seed << ": " << found->lens.f() << " +- " << 100 * found->sigma[0] << " %";
+  }
+}
+
 TEST(SelfCalibration, TooFewClipsAreRefused) {
   ClipWorld world = world_of(500);
   world.clips = 3;
