@@ -65,8 +65,9 @@ class TWOFOLD_API BoardCalibrator {
     std::string board;
     int width = 0, height = 0;  ///< of the raw images [px], > 0
     bool stereo = false;        ///< the board is looked for in both images
-    bool live = false;          ///< somebody moves the board: views are taken while it rests
-    int views = 20;             ///< different ones that are wanted, 10 to 200
+    bool live =
+        false;  ///< somebody moves the board, before a camera or in a video: views are taken while it rests
+    int views = 20;  ///< different ones that are wanted, 10 to 200
 
     /// Empty when valid; otherwise names the field, the rule and, where it is a number, the value.
     [[nodiscard]] TWOFOLD_API std::string invalid_reason() const;

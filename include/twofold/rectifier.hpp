@@ -45,15 +45,18 @@ class TWOFOLD_API FrameRectifier {
   explicit FrameRectifier(const std::filesystem::path& calibration, int width = 0, int height = 0,
                           bool left_only = false);
   /// One camera by its K and D, as the file of the same numbers; what its R and P would make of the images
-  /// is not looked at. rig().readout is left open: in a copy of rig(), say what is known.
+  /// is not looked at. rig().readout is left open: in a copy of rig(), say what is known,
+  /// depth_unit for depth images of whole numbers alone.
   ///
   /// @param sensor  kMono; kRgbd: with depth images that are the camera's, pixel by pixel
   ///
   /// Throws std::invalid_argument naming what is wrong, with its value; so do the others below.
   explicit FrameRectifier(const CameraInfo& camera, Sensor sensor = Sensor::kMono);
-  /// A stereo pair: K and D are its lenses, R and P say how the cameras stand to each other.
+  /// A stereo pair: K and D are its lenses, R and P say how the cameras stand to each other, and no more:
+  /// the rectified images are this class' own, rig() is not P, and T_rectified_raw() is not R.
   FrameRectifier(const CameraInfo& left, const CameraInfo& right);
-  /// A stereo pair by K, D and the left camera's pose in the right one (OpenCV's R, T of stereoCalibrate).
+  /// A stereo pair by K, D and the left camera's pose in the right one [m] (OpenCV's R, T of stereoCalibrate;
+  /// twofold/eigen.hpp makes a Pose of them).
   FrameRectifier(const CameraInfo& left, const CameraInfo& right, const Pose& T_right_left);
   /// What a BoardCalibrator found.
   explicit FrameRectifier(const BoardCalibration& calibration);

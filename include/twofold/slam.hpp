@@ -72,7 +72,8 @@ struct SlamOptions {
   /// Where in `map` the camera is looked for from the first frame on, beside recognition: there, and then
   /// around there as far as its deviations say, at four poses a frame, in 60 frames at most. It is believed
   /// where as much of the map is found as a recognised place must show; a wrong one costs some milliseconds a
-  /// frame, and recognition goes on.
+  /// frame, and recognition goes on. Deviations of more than some centimetres and degrees are sampled too
+  /// thinly to find much.
   std::optional<InitialPose> initial_pose = {};
   /// Recognise places: closes large loops, finds a lost camera, joins map parts. Needed for `map`.
   bool places = true;

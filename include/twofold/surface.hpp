@@ -121,7 +121,7 @@ struct SurfacePiece {
 struct SurfaceChanges {
   std::uint64_t revision = 0;        ///< that it leads to
   double cell_size = 0;              ///< edge of a cell [m]
-  std::vector<SurfacePiece> pieces;  ///< these replace what was there
+  std::vector<SurfacePiece> pieces;  ///< these replace what was there; an empty one: nothing is there now
 };
 
 /// A dense surface from frames with poses, for planners and models: where is free space, how far is the next
@@ -296,11 +296,11 @@ class TWOFOLD_API MapSurface {
   /// std::invalid_argument for an older map than that of the last call, std::bad_alloc when memory ends.
   SurfaceUpdate update(const MapSnapshot& map);
   /// What changed in the mesh of the camera's map part after that revision, as of the last update; of 0 on,
-  /// all of it, as also after the camera came to another part: its cells replace those of the part before.
-  /// The submaps are joined for it, only where one changed, or moved by more than half a voxel: a loop
-  /// changes most pieces, and less than that moves none. Small specks, which SurfaceSnapshot::mesh leaves
-  /// out, are there. The first call joins all, and from then on what is joined takes memory that memory_mb
-  /// does not count. Throws std::bad_alloc when memory ends.
+  /// all of it, as also after the camera came to another part: its cells replace those of the part before. In
+  /// the world of snapshot().map_part(). The submaps are joined for it, only where one changed, or moved by
+  /// more than half a voxel: a loop changes most pieces, and less than that moves none. Small specks, which
+  /// SurfaceSnapshot::mesh leaves out, are there. The first call joins all, and from then on what is joined
+  /// takes memory that memory_mb does not count. Throws std::bad_alloc when memory ends.
   [[nodiscard]] SurfaceChanges mesh_changes(std::uint64_t since);
   /// As of the end of the last update, of the map part in which the camera was then; of nothing before the
   /// first. O(1).
