@@ -66,7 +66,7 @@ TEST(CalibrateCommand, FolderOfPairsBecomesACalibrationThatCanBeRead) {
 
 /// Each pair of images for as long as somebody holds the board still.
 void write_side_by_side(const ScratchFolder& folder, const std::string& name) {
-  constexpr int kHeld = 12;  // frames
+  constexpr int kHeld = 7;  // frames
   cv::VideoWriter writer;
   for (int n = 0; n < 16; ++n) {
     cv::Mat both;

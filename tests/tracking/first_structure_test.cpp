@@ -171,21 +171,6 @@ TEST(FirstStructure, WaitsWhileTheCameraStandsOrTurnsOnTheSpot) {
               "turning, nearly");
 }
 
-/// Seen through a focal length that is only guessed a rotation is a homography, as a plane is.
-TEST(FirstStructure, WaitsWhileTheCameraTurnsOnTheSpotBehindAnotherLens) {
-  const Setting turning{scattered, moving({0, 0, 0}, {0.03, 0.25, 0.02})};
-  for (const double scale : {0.6, 0.8, 0.9, 1.2, 1.4, 2.0}) {
-    Rig rig = kRig;
-    rig.camera.fx *= scale;
-    rig.camera.fy *= scale;
-    for (std::uint32_t seed = 1; seed <= 5; ++seed) {
-      const auto start = first_structure(rig, views_of(turning, seed), {});
-      ASSERT_FALSE(start) << scale << ' ' << seed;
-      EXPECT_TRUE(start.error() == LostCause::kOtherFocalLength || scale != 1.2) << describe(start.error());
-    }
-  }
-}
-
 TEST(FirstStructure, StartsThoughTheReadoutIsNotKnown) {
   const std::pair<const char*, Setting> settings[] = {
       {"sideways", {scattered, moving({-0.6, 0, 0}, {0, 0, 0})}},

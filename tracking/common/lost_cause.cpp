@@ -39,9 +39,6 @@ const char* describe(LostCause cause) {
       return "too little parallax to start a map";
     case LostCause::kRotatingOnly:
       return "rotating only: no depth to start a map with";
-    case LostCause::kOtherFocalLength:
-      return "rotating only, and with another focal length than the calibration's: no depth to start a map "
-             "with";
     case LostCause::kNoCommonMotion:
       return "corners do not move as one moving camera sees them";
     case LostCause::kPlaneUndecided:

@@ -24,7 +24,6 @@ enum class LostCause : std::uint8_t {
   kTooFewCorners,      ///< hardly anything could be followed
   kTooLittleParallax,  ///< it has not moved enough to see depth
   kRotatingOnly,       ///< it turns on the spot
-  kOtherFocalLength,   ///< likewise, with another focal length than the calibration's
   kNoCommonMotion,     ///< corners do not move as one moving camera sees them
   kPlaneUndecided,     ///< a plane, and two motions explain how it looks
   kNoStructure         ///< a depth camera: few corners, and surfaces along which it could have slid

@@ -16,14 +16,9 @@
 #include "geometry/homography.hpp"
 #include "geometry/inverse_depth.hpp"
 #include "geometry/view_rotation.hpp"
-#include "tracking/monocular/turned_lens.hpp"
 
 namespace twofold {
 namespace {
-
-/// Of what the essential matrix explains, which a rotation with a focal length of its own explains as well.
-/// More than max_rotation_share: it has a freedom more, and takes some of what a short way shows for itself.
-constexpr double kAsWell = 0.8;
 
 std::vector<Vector3> bearings(const PinholeCamera& camera, const std::vector<Vector2>& pixels) {
   std::vector<Vector3> result;
@@ -90,9 +85,7 @@ class FirstStructureEstimator {
       for (const SE3& motion : decompose_homography(plane->H_b_a, first_[any], last_[any]))
         motions.push_back(motion);
     }
-    auto structure = best_of(motions);
-    if (structure && turned_behind_another_lens()) return tl::unexpected(LostCause::kOtherFocalLength);
-    return structure;
+    return best_of(motions);
   }
 
  private:
@@ -124,17 +117,6 @@ class FirstStructureEstimator {
     }
     return LostCause::kNone;
   }
-  /// Depths that explain the corners are invented if a rotation with a focal length of its own does as well.
-  [[nodiscard]] bool turned_behind_another_lens() const {
-    std::vector<Vector3> first, last;
-    for (const int i : inliers_) {
-      first.push_back(first_[static_cast<std::size_t>(i)]);
-      last.push_back(last_[static_cast<std::size_t>(i)]);
-    }
-    const TurnedLens turned = turned_lens(first, last, ransac_options(options_.rotation_px));
-    return turned.explained > kAsWell * static_cast<double>(inliers_.size());
-  }
-
   /// The rotation that explains most, if the rows take that share of the frames' interval to be read.
   [[nodiscard]] std::optional<ViewRotation> rotation_through(double share) const {
     const RansacOptions ransac = ransac_options(options_.rotation_px);

@@ -90,7 +90,7 @@ struct FirstStructure {
 ///
 /// Deterministic. Allocates; its work is bounded by the number of corners and max_samples.
 /// @return  otherwise why not: kTooFewCorners, kTooLittleParallax, kRotatingOnly, kNoCommonMotion,
-///          kPlaneUndecided, kOtherFocalLength (turned_lens)
+///          kPlaneUndecided
 [[nodiscard]] tl::expected<FirstStructure, LostCause> first_structure(const Rig& rig,
                                                                       const CornerViews& views,
                                                                       const FirstStructureOptions& options);
