@@ -224,9 +224,9 @@ TEST(CameraNumbers, OneCameraThatMakesNoSenseIsRefusedWithItsNumber) {
 TEST(CameraNumbers, APairThatMakesNoSenseIsRefusedWithItsNumber) {
   const auto expect = [](const std::string& words,
                          const std::function<void(CameraInfo&, CameraInfo&)>& spoil) {
-    auto [left, right] = turned_pair();
-    spoil(left, right);
-    const std::string why = refusal([&] { (void)FrameRectifier(left, right); });
+    auto pair = turned_pair();
+    spoil(pair.first, pair.second);
+    const std::string why = refusal([&] { (void)FrameRectifier(pair.first, pair.second); });
     EXPECT_NE(why.find(words), std::string::npos) << why;
   };
   expect("right camera: K must be", [](CameraInfo&, CameraInfo& right) { right.K[4] = right.K[8] = 0; });
