@@ -9,6 +9,7 @@
 #include "python/arrays.hpp"
 #include "python/bindings.hpp"
 #include "python/poses.hpp"
+#include "twofold/eigen.hpp"
 #include "twofold/estimate.hpp"
 
 namespace twofold::python {
@@ -57,6 +58,21 @@ py::array matrix_of(const Pose& T_a_b) {
   return matrix;
 }
 
+Pose pose_of_matrix(const Array& T_a_b) {
+  constexpr double kTolerance = 1e-3;  // as of float32, or of some decimals
+  if (T_a_b.ndim() != 2 || T_a_b.shape(0) != 4 || T_a_b.shape(1) != 4)
+    throw py::value_error("T must have shape (4, 4)");
+  const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> T(T_a_b.data());
+  const Eigen::Matrix3d R = T.topLeftCorner<3, 3>();
+  const bool is_rotation = (R * R.transpose()).isIdentity(kTolerance) && R.determinant() > 0;
+  if (!T.allFinite() || !is_rotation || !T.row(3).isApprox(Eigen::RowVector4d::UnitW(), kTolerance))
+    throw py::value_error("T must be a rigid motion: [R t], R a rotation, above [0 0 0 1]");
+  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+  motion.linear() = Eigen::Quaterniond(R).normalized().toRotationMatrix();
+  motion.translation() = T.topRightCorner<3, 1>();
+  return from_eigen(motion);
+}
+
 std::string text_of(const Pose& pose) {
   return fmt::format("Pose(t=[{:.4f}, {:.4f}, {:.4f}], q=[{:.4f}, {:.4f}, {:.4f}, {:.4f}])", pose.t[0],
                      pose.t[1], pose.t[2], pose.q[0], pose.q[1], pose.q[2], pose.q[3]);
@@ -76,6 +92,10 @@ void bind_pose(py::module_& module) {
       .def_property_readonly(
           "q", [](const py::object& self) { return view_of(self.cast<const Pose&>().q.data(), {4}, self); },
           "Unit quaternion (4,), x y z w, read-only.")
+      .def_static(
+          "from_matrix", &pose_of_matrix, py::arg("T"),
+          "From the 4x4 matrix T_a_b [R t; 0 0 0 1]; R is made a rotation exactly when it is one within "
+          "0.001. Raises ValueError.")
       .def("matrix", &matrix_of, "The 4x4 matrix, a new array.")
       .def("inverse", &inverse, "T_b_a.")
       .def(

@@ -46,8 +46,8 @@ class PoseReporter {
   // The last frame that was tracked, with the pose and part it was last said to have; of state kLost before
   // the first.
   FrameRecord last_;
-  bool was_lost_ = false;
-  SE3 T_odom_c_;  // of the last tracked frame
+  bool was_lost_ = true;  // or not placed yet
+  SE3 T_odom_c_;          // of the last tracked frame
 };
 
 }  // namespace twofold

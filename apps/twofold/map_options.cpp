@@ -1,6 +1,7 @@
 #include "apps/twofold/map_options.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -9,6 +10,7 @@
 #include "graph/part_extraction.hpp"
 #include "io/files/io_error.hpp"
 #include "io/sources/resampled_source.hpp"
+#include "twofold/slam.hpp"
 
 namespace twofold {
 namespace {
@@ -21,12 +23,25 @@ void expect_sensible(const MapArguments& arguments, const EngineOptions& options
     throw IoError("--checkpoint", fmt::format("must be a number of seconds, is {}", arguments.checkpoint));
   if (arguments.checkpoint > 0 && arguments.save.empty())
     throw IoError("--checkpoint", "needs --save-map, the file to write to");
+  if (!arguments.initial_pose.empty() && arguments.load.empty())
+    throw IoError("--initial-pose", "needs --load-map");
   if (!arguments.load.empty() && !options.vocabulary)
     throw IoError("--load-map", "needs places, by which the camera finds itself in the map");
   const std::filesystem::path folder = std::filesystem::path(arguments.save).parent_path();
   if (!folder.empty() && !std::filesystem::is_directory(folder))  // known now, not after an hour of mapping
     throw IoError(arguments.save, "the folder is not there");
   if (!arguments.save.empty()) expect_place_for_map(arguments.save);
+}
+
+/// What is not exact is searched around it, as far as a robot at its dock may be off.
+AssumedPose assumed_pose(const std::vector<double>& numbers) {
+  constexpr double kTolerance = 0.01;  // of the quaternion's length, as in trajectory files
+  const Vector3 t(numbers[0], numbers[1], numbers[2]);
+  const Eigen::Quaterniond q(numbers[6], numbers[3], numbers[4], numbers[5]);
+  if (!t.allFinite() || !(std::abs(q.norm() - 1) <= kTolerance))
+    throw IoError("--initial-pose", "is a position and a quaternion of length 1: X,Y,Z,QX,QY,QZ,QW");
+  const InitialPose usual;
+  return {kNoKeyframe, SE3(SO3(q), t), usual.position_sigma, usual.angle_sigma};
 }
 
 }  // namespace
@@ -53,6 +68,12 @@ void add_map_options(CLI::App& command, MapArguments& arguments) {
       ->check(empty_name);
   command.add_flag("--localise-only", arguments.localise_only,
                    "Poses in the loaded map, which does not change");
+  command
+      .add_option("--initial-pose", arguments.initial_pose,
+                  "Where the camera begins in the loaded map, as a line of trajectory.txt has it: "
+                  "X,Y,Z,QX,QY,QZ,QW [m]. Searched first, believed where the map is found there")
+      ->delimiter(',')
+      ->expected(7);
 }
 
 void apply_map_options(const MapArguments& arguments, EngineOptions& options) {
@@ -65,6 +86,7 @@ void apply_map_options(const MapArguments& arguments, EngineOptions& options) {
     throw IoError(arguments.load, "knows no places, so that no camera can find itself in it");
   }
   options.map = std::move(map);
+  if (!arguments.initial_pose.empty()) options.assumed_pose = assumed_pose(arguments.initial_pose);
 }
 
 std::unique_ptr<FrameSource> resampled_for_map(std::unique_ptr<FrameSource> source,

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "engine/options.hpp"
 #include "engine/result.hpp"
@@ -21,6 +22,8 @@ struct MapArguments {
   std::string save;
   double checkpoint = 0;  ///< [s], 0: none
   bool localise_only = false;
+  /// T_w_c in the world of the loaded map: x y z [m], and the unit quaternion qx qy qz qw. Empty: not known.
+  std::vector<double> initial_pose;
 };
 
 void add_map_options(CLI::App& command, MapArguments& arguments);

@@ -73,6 +73,7 @@ void expect_options_of_filter(const RunArguments& given) {
       {"--checkpoint", given.map.checkpoint != 0},
       {"--load-map", !given.map.load.empty()},
       {"--localise-only", given.map.localise_only},
+      {"--initial-pose", !given.map.initial_pose.empty()},
       {"--record", !given.record.empty()},
       {"--trace", !given.trace.empty()},
       {"--replay-schedule", !given.replay_schedule.empty()},

@@ -84,7 +84,7 @@ enum class MapEventKind : std::uint8_t {
   kLoopClosure,     ///< a place was recognised
   kPoseGraph,       ///< the whole pose graph was optimised
   kPartsJoined,     ///< the camera's map part took another one's world, or another one moved into its world
-  kRelocalisation,  ///< the lost camera found itself in the map
+  kRelocalisation,  ///< the lost camera, or one in a loaded map, found itself in the map
   kNewPart          ///< the lost camera began a map part with a world of its own
 };
 [[nodiscard]] TWOFOLD_API const char* to_string(MapEventKind kind);

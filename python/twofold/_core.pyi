@@ -32,6 +32,11 @@ class Pose:
     @property
     def q(self) -> NDArray[np.float64]:
         """Unit quaternion (4,), x y z w, read-only."""
+    @staticmethod
+    def from_matrix(T: ArrayLike) -> Pose:
+        """From the 4x4 matrix T_a_b [R t; 0 0 0 1]; R is made a rotation exactly when it is one within 0.001. Raises
+        ValueError.
+        """
     def matrix(self) -> NDArray[np.float64]:
         """The 4x4 matrix, a new array."""
     def inverse(self) -> Pose:

@@ -3,8 +3,12 @@
 
 #include <chrono>
 #include <csignal>
+#include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <thread>
+
+#include <fmt/format.h>
 
 #include "tests/apps/command.hpp"
 #include "tests/graph/sample_map.hpp"
@@ -116,6 +120,26 @@ TEST_F(MapCommand, AnotherCameraIsLocalisedInIt) {
   expect_bad_input(run_in_map("--localise-only", "'synthetic:desk?frames=6'"), "images are 640x480");
   expect_bad_input(run_in_map("--localise-only --camera mono", "'synthetic:desk?frames=6&f=2000'"),
                    "focal length");
+}
+
+/// From the first frame on, and recognised later where it is said to be elsewhere.
+TEST_F(MapCommand, TheCameraIsPlacedWhereItIsSaidToBegin) {
+  const auto first_index = [&](const std::string& pose) {
+    const Outcome outcome = run_in_map("--deterministic --localise-only --initial-pose " + pose);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return summary()["loaded_map"]["recognised_at_frame"].get<int>();
+  };
+  std::ifstream poses(*shared_ / "made/trajectory.txt");
+  std::string line, t, x, y, z, qx, qy, qz, qw;
+  while (std::getline(poses, line) && line[0] == '#') {
+  }
+  std::istringstream(line) >> t >> x >> y >> z >> qx >> qy >> qz >> qw;
+  EXPECT_EQ(first_index(fmt::format("{},{},{},{},{},{},{}", x, y, z, qx, qy, qz, qw)), 0);
+  EXPECT_GT(first_index("-3,0,-5,0,1,0,0"), 0);
+  expect_bad_input(run_in_map("--initial-pose 1,2,3"), "--initial-pose");
+  expect_bad_input(run_in_map("--initial-pose 1,2,3,0,0,0,2"), "--initial-pose");
+  expect_bad_input(run_in_map("--initial-pose 1,2,nan,0,0,0,1"), "--initial-pose");
+  expect_bad_input(run(folder_, "run " + kDesk + " --initial-pose 0,0,0,0,0,0,1"), "--load-map");
 }
 
 TEST_F(MapCommand, GoingOnTwiceGivesTheSameBytes) {

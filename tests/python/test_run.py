@@ -142,6 +142,25 @@ def test_poses_compose() -> None:
         twofold.Pose([0, 0, 0], [0, 0, 0, 2])
 
 
+def test_poses_are_made_of_matrices() -> None:
+    T_a_b = twofold.Pose([1, 2, 3], np.array([0.1, -0.2, 0.3, 0.9]) / np.linalg.norm([0.1, -0.2, 0.3, 0.9]))
+    again = twofold.Pose.from_matrix(T_a_b.matrix())
+    np.testing.assert_allclose(again.matrix(), T_a_b.matrix(), atol=1e-14)
+    rounded = twofold.Pose.from_matrix(T_a_b.matrix().astype(np.float32))
+    np.testing.assert_allclose(rounded.matrix(), T_a_b.matrix(), atol=1e-6)
+    assert np.linalg.norm(rounded.q) == pytest.approx(1, abs=1e-15)
+    mirrored, scaled, projective, unknown = (T_a_b.matrix() for _ in range(4))
+    mirrored[:3, 0] *= -1
+    scaled[:3, :3] *= 1.01
+    projective[3, 0] = 0.1
+    unknown[0, 3] = np.nan
+    for wrong in [mirrored, scaled, projective, unknown]:
+        with pytest.raises(ValueError, match="rigid motion"):
+            twofold.Pose.from_matrix(wrong)
+    with pytest.raises(ValueError, match="shape"):
+        twofold.Pose.from_matrix(np.eye(3))
+
+
 def test_times_of_a_trajectory_are_whole_nanoseconds() -> None:
     with pytest.raises(TypeError, match="nanoseconds"):
         twofold.Trajectory([1.5, 2.5], np.zeros((2, 3)), np.tile([0, 0, 0, 1], (2, 1)))

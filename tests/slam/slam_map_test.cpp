@@ -275,12 +275,18 @@ class InitialPoseTest : public SlamMapTest {
 
 TEST_F(InitialPoseTest, TheFirstFrameIsTrackedWhereTheCameraIsSaidToBe) {
   Slam slam(rig(), options(true_pose()));
+  std::vector<MapEvent> events;
+  slam.on_event([&](const MapEvent& event) { events.push_back(event); });
   push_all(slam, 0, 1);
   ASSERT_TRUE(slam.latest());
   EXPECT_EQ(slam.latest()->state, TrackingState::kTracked);
   EXPECT_EQ(slam.latest()->map_part, poses_[0].map_part);
   for (const std::size_t axis : {0U, 1U, 2U})
     EXPECT_NEAR(slam.latest()->T_world_camera.t[axis], poses_[0].T_world_camera.t[axis], 0.02);
+  ASSERT_EQ(events.size(), 1U) << "it is in the map, as after any other way to find itself there";
+  EXPECT_EQ(events[0].kind, MapEventKind::kRelocalisation);
+  EXPECT_EQ(events[0].map_part, poses_[0].map_part);
+  EXPECT_EQ(events[0].map_part_before, kNoId);
 }
 
 TEST_F(InitialPoseTest, AWrongOneIsNotBelievedAndTheCameraIsRecognised) {
