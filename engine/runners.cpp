@@ -1,6 +1,9 @@
 #include "engine/runners.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "base/processor_time.hpp"
@@ -50,6 +53,9 @@ CorrectionReason reason_of(MapChange::Kind kind) {
   return CorrectionReason::kPartsJoined;
 }
 
+/// Frames: those between see the same points with the same errors, and time is saved.
+constexpr int kFocalPeriod = 4;
+
 constexpr std::uint64_t kPatience =
     32;  // versions: a loop that the mapper dropped would be waited for for ever
 
@@ -81,6 +87,8 @@ TrackerRunner::TrackerRunner(const Rig& rig, const EngineOptions& options, Trace
       times_("tracker", trace),
       on_pose_(options.on_pose),
       on_frame_(options.on_frame),
+      focal_sigma_(options.mapper.global.focal_sigma),
+      map_sensor_(options.map ? options.map->rig.kind : rig.kind),
       can_relocalise_(options.vocabulary != nullptr),
       localise_only_(options.localise_only),
       paused_(options.mapping_paused) {
@@ -94,6 +102,8 @@ TrackerRunner::TrackerRunner(const Rig& rig, const EngineOptions& options, Trace
   version_counter_ = times_.add_counter("snapshot version");
   effort_counter_ = times_.add_counter("effort level");
   if (options.map) tracker_.continue_from(options.map->graph, options.assumed_pose);
+  if (options.map && localise_only_ && rig.kind == SensorKind::kMono)
+    focal_resection_.emplace(rig, options.tracker.local_map.max_searches, options.tracker.pose.motion);
 }
 
 void TrackerRunner::locate(const Frame& frame, const GraphSnapshot& graph, EffortLevel effort,
@@ -137,6 +147,9 @@ void TrackerRunner::tell(std::int64_t exposed_ns, std::int64_t now_ns, FrameReco
 bool TrackerRunner::prepare_next(FrameRecord& record) {
   const std::int64_t resumed_ns = steady_now_ns();
   tracker_.prepare_next(*step_);
+  const bool asked = focal_resection_ && record.frame_index % kFocalPeriod == 0;
+  if (asked && record.state == FrameState::kTracked)
+    focal_resection_->add(tracker_.last_observations(), step_->result.T_c_ref);
   record.tracking_ns += steady_now_ns() - resumed_ns;
   times_.record(frame_stage_, begin_ns_, record.tracking_ns);
   std::int64_t at_ns = begin_ns_;
@@ -197,6 +210,18 @@ void TrackerRunner::take_answer(const RelocalisationAnswer& answer) {
   if (!answer) return;
   ++recognised_;
   tracker_.relocalise(answer->keyframe, answer->T_c_k);
+}
+
+std::string TrackerRunner::focal_note() const {
+  auto found = focal_resection_ ? focal_resection_->estimate() : std::nullopt;
+  if (!found || found->sigma > focal_sigma_) return "";
+  found->sigma = std::hypot(found->sigma, found->scale * focal_sigma_);
+  if (!found->contradicts_rig()) return "";
+  // As a share: images may have been resampled for the map, and its pixels are not the camera's then.
+  return fmt::format("the map shows a focal length {:.1f} +- {:.1f} % {} than the calibration says{}",
+                     100 * std::abs(found->scale - 1), 100 * found->sigma,
+                     found->scale < 1 ? "shorter" : "longer",
+                     map_sensor_ == SensorKind::kMono ? ", or that of the map's own camera is wrong" : "");
 }
 
 void TrackerRunner::place_earlier_frames(RecordSequence<FrameRecord>& frames, FrameCounts& counts) const {
@@ -357,7 +382,9 @@ void collect_results(TrackerRunner& tracking, MapperRunner& mapping, LoopCloserR
   result.graph = mapping.finish();
   tracking.place_earlier_frames(result.frames, result.counts);
   mapping.replacement_log().hang_on_live_keyframes(result.frames);
-  if (!mapping.map_note().empty()) result.notes.push_back(mapping.map_note());
+  for (std::string note : {mapping.map_note(), tracking.focal_note()}) {
+    if (!note.empty()) result.notes.push_back(std::move(note));
+  }
   result.row_offset = tracking.row_offset();
   result.recognised = tracking.recognised();
   result.mapping = mapping.totals();

@@ -11,6 +11,7 @@
 #include "engine/options.hpp"
 #include "engine/result.hpp"
 #include "engine/stage_timer.hpp"
+#include "estimation/focal_resection.hpp"
 #include "graph/keyframe_proposal.hpp"
 #include "graph/loop_constraint.hpp"
 #include "graph/pose_graph_update.hpp"
@@ -75,6 +76,9 @@ class TrackerRunner {
   void place_earlier_frames(RecordSequence<FrameRecord>& frames, FrameCounts& counts) const;
 
   [[nodiscard]] std::optional<ReadoutEstimate> readout() const { return tracker_.readout(); }
+  /// Of one camera in a loaded map that does not change, where the calibration's focal length is not that
+  /// with which its frames fit into the map: a sentence; else empty.
+  [[nodiscard]] std::string focal_note() const;
   [[nodiscard]] const StageRecorder& times() const { return times_; }
   [[nodiscard]] StageRecorder& times() { return times_; }
 
@@ -95,7 +99,10 @@ class TrackerRunner {
     KeyframeId reference = kNoKeyframe;
     EarlierFrame frame;
   };
-  std::vector<PlacedFrame> earlier_;  // grows when one camera starts
+  std::vector<PlacedFrame> earlier_;               // grows when one camera starts
+  std::optional<FocalResection> focal_resection_;  // one camera in a map that does not change
+  const double focal_sigma_;
+  const SensorKind map_sensor_;
   PoseCorrection correction_;
   // Of the last step.
   std::optional<FrameStep> step_;

@@ -142,6 +142,23 @@ TEST_F(MapCommand, TheCameraIsPlacedWhereItIsSaidToBegin) {
   expect_bad_input(run(folder_, "run " + kDesk + " --initial-pose 0,0,0,0,0,0,1"), "--load-map");
 }
 
+/// A map in metres knows the focal length of whoever is localised in it.
+TEST_F(MapCommand, AWrongFocalLengthIsTold) {
+  const auto notes = [&](const std::string& error) {
+    const Outcome outcome =
+        run_in_map("--deterministic --localise-only --camera mono",
+                   "'synthetic:desk?frames=60&width=320&height=240&f_error=" + error + "'");
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return summary()["notes"].dump();
+  };
+  EXPECT_EQ(notes("0"), "[]");
+  for (const auto& [error, share] : {std::pair("0.1", "9."), std::pair("-0.1", "11.")}) {
+    const std::string told = notes(error);
+    EXPECT_NE(told.find(std::string("the map shows a focal length ") + share), std::string::npos) << told;
+    EXPECT_NE(told.find(error[0] == '-' ? "longer than" : "shorter than"), std::string::npos) << told;
+  }
+}
+
 TEST_F(MapCommand, GoingOnTwiceGivesTheSameBytes) {
   std::string maps[2];
   for (int i = 0; i < 2; ++i) {
