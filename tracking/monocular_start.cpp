@@ -55,6 +55,7 @@ void MonocularStart::reset() {
 
 void MonocularStart::watch(const FrameImages& images, const Frame& frame) {
   follow_all(images, frame);
+  drop_unseen_candidates();
   renew_candidates(images, frame);
   remember_frame(images, frame);
 }
@@ -69,6 +70,7 @@ tl::expected<MonocularStartResult, LostCause> MonocularStart::step(const FrameIm
     if (structure) return MonocularStartResult{&candidates_[c], *structure};
     if (c == order_.front()) cause = structure.error();
   }
+  if (drop_unseen_candidates()) cause = LostCause::kStepsTooWide;
   renew_candidates(images, frame);
   remember_frame(images, frame);
   return tl::unexpected(candidates_[order_.front()].corners.empty() ? LostCause::kTooFewCorners : cause);
@@ -248,15 +250,20 @@ tl::expected<FirstStructure, LostCause> MonocularStart::examine(const StartCandi
   return first_structure(rig_, views, options_.monocular_start.first_structure);
 }
 
-/// Gives up candidates of which little is still in view, and takes the frame as one when the newest has been
-/// left behind. The oldest makes room for it.
-void MonocularStart::renew_candidates(const FrameImages& images, const Frame& frame) {
-  std::erase_if(order_, [&](std::size_t c) {
+/// Gives up candidates of which little is still in view.
+/// @return  whether that is all of them, the newest too: it was taken where most was still in view
+bool MonocularStart::drop_unseen_candidates() {
+  const std::size_t dropped = std::erase_if(order_, [&](std::size_t c) {
     const StartCandidate& candidate = candidates_[c];
     const auto fewest = static_cast<std::size_t>(options_.monocular_start.min_left_share *
                                                  static_cast<double>(candidate.corners_at_first));
     return candidate.corners.size() < std::max<std::size_t>(fewest, 1);
   });
+  return dropped > 0 && order_.empty();
+}
+
+/// Takes the frame as a candidate when the newest has been left behind. The oldest makes room for it.
+void MonocularStart::renew_candidates(const FrameImages& images, const Frame& frame) {
   if (!order_.empty() &&
       median_flow(candidates_[order_.back()]) < options_.monocular_start.next_flow * rig_.camera.width)
     return;

@@ -85,6 +85,7 @@ class MonocularStart {
   void remember_place(StartCandidate& candidate) const;
   void remember_path(std::int64_t frame_index, StartCandidate& candidate) const;
   [[nodiscard]] tl::expected<FirstStructure, LostCause> examine(const StartCandidate& candidate) const;
+  bool drop_unseen_candidates();
   void renew_candidates(const FrameImages& images, const Frame& frame);
   void remember_frame(const FrameImages& images, const Frame& frame);
   void fill(StartCandidate& candidate, const FrameImages& images, const Frame& frame);

@@ -1,7 +1,6 @@
 #include "apps/twofold/map_options.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include <fmt/format.h>
 
@@ -10,6 +9,7 @@
 #include "graph/part_extraction.hpp"
 #include "io/files/io_error.hpp"
 #include "io/sources/resampled_source.hpp"
+#include "slam/conversions.hpp"
 #include "twofold/slam.hpp"
 
 namespace twofold {
@@ -35,13 +35,12 @@ void expect_sensible(const MapArguments& arguments, const EngineOptions& options
 
 /// What is not exact is searched around it, as far as a robot at its dock may be off.
 AssumedPose assumed_pose(const std::vector<double>& numbers) {
-  constexpr double kTolerance = 0.01;  // of the quaternion's length, as in trajectory files
-  const Vector3 t(numbers[0], numbers[1], numbers[2]);
-  const Eigen::Quaterniond q(numbers[6], numbers[3], numbers[4], numbers[5]);
-  if (!t.allFinite() || !(std::abs(q.norm() - 1) <= kTolerance))
+  const Pose pose{.q = {numbers[3], numbers[4], numbers[5], numbers[6]},
+                  .t = {numbers[0], numbers[1], numbers[2]}};
+  if (!is_rigid_motion(pose))
     throw IoError("--initial-pose", "is a position and a quaternion of length 1: X,Y,Z,QX,QY,QZ,QW");
   const InitialPose usual;
-  return {kNoKeyframe, SE3(SO3(q), t), usual.position_sigma, usual.angle_sigma};
+  return {kNoKeyframe, to_se3(pose), usual.position_sigma, usual.angle_sigma};
 }
 
 }  // namespace

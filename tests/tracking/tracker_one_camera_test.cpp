@@ -101,6 +101,19 @@ TEST(TrackerOneCamera, TurningOnTheSpotItSaysSo) {
   EXPECT_GT(said, 12);
 }
 
+/// It said that there was too little parallax.
+TEST(TrackerOneCamera, WhereNoFrameSeesWhatTheOneBeforeSawItSaysSo) {
+  const Rig rig = test_rig(SensorKind::kMono, 320, 240);
+  Odometry odometry(rig);
+  const auto leaping = [](int i) { return SE3(SO3::exp(Vector3(0, 1.3 * i, 0)), Vector3(0.3 * i, 0, 0)); };
+  for (const Frame& frame : walk(leaping, 12)) {
+    const TrackResult result = odometry.step(frame);
+    EXPECT_EQ(result.status, TrackStatus::kInitialising) << frame.index;
+    EXPECT_EQ(result.cause, frame.index == 0 ? LostCause::kTooLittleParallax : LostCause::kStepsTooWide)
+        << frame.index;
+  }
+}
+
 /// As while the mapper is behind. From the third frame on there is nothing to write a keyframe into, for so
 /// long that the corners have moved further than they are looked for from one frame to the next.
 TEST(TrackerOneCamera, CornersAreFollowedWhileNoKeyframeCanBeMade) {

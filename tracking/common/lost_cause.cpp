@@ -35,6 +35,8 @@ const char* describe(LostCause cause) {
       return "a gap in the time stamps, and the camera moved on";
     case LostCause::kTooFewCorners:
       return "too few corners to start a map";
+    case LostCause::kStepsTooWide:
+      return "corners were not found again from one frame to the next: frames are too far apart, or blurred";
     case LostCause::kTooLittleParallax:
       return "too little parallax to start a map";
     case LostCause::kRotatingOnly:

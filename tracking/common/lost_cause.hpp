@@ -22,6 +22,7 @@ enum class LostCause : std::uint8_t {
   kGapInTime,            ///< the source's time stamps jump, with no frame missing by number
   // What one camera waits for before it can start a map.
   kTooFewCorners,      ///< hardly anything could be followed
+  kStepsTooWide,       ///< not even the frame before shares corners with it
   kTooLittleParallax,  ///< it has not moved enough to see depth
   kRotatingOnly,       ///< it turns on the spot
   kNoCommonMotion,     ///< corners do not move as one moving camera sees them
