@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <random>
 #include <vector>
+
+#include "tests/allocation_counter.hpp"
 
 namespace twofold {
 namespace {
@@ -44,7 +47,9 @@ std::optional<FocalLengthEstimate> resected(double wrong, unsigned seed, int fra
           {x_ref, StereoPixel(seen.x(), seen.y(), Rig::kNoRight).cast<float>(), Eigen::Vector3f(1, 1, 0)});
     }
     const MotionOnlyResult given_pose = optimise_motion(given, observations, T_c_ref, options);
+    const std::uint64_t before = testing::allocations();
     resection.add(observations, given_pose.T_c_ref);
+    EXPECT_EQ(testing::allocations(), before) << "the tracker's thread asks it";
   }
   return resection.estimate();
 }
