@@ -1,6 +1,7 @@
-// Open3D's fusion on one core, of the views that surface_bench fuses; only where its library is installed.
+// Open3D's fusion of the views that surface_bench fuses; only where its library is installed. It takes as
+// many threads as the machine has, whatever omp_set_num_threads says, and one with OMP_NUM_THREADS=1
+// open3d_bench.
 #include <benchmark/benchmark.h>
-#include <omp.h>
 #include <open3d/pipelines/integration/ScalableTSDFVolume.h>
 
 #include "bench/surface/depth_views.hpp"
@@ -32,8 +33,4 @@ BENCHMARK(fuse_depth_open3d)->Arg(5)->Arg(10)->Unit(benchmark::kMillisecond)->Me
 }  // namespace
 }  // namespace twofold
 
-int main(int argc, char** argv) {
-  omp_set_num_threads(1);  // the library has read OMP_NUM_THREADS when main begins
-  benchmark::Initialize(&argc, argv);
-  benchmark::RunSpecifiedBenchmarks();
-}
+BENCHMARK_MAIN();
