@@ -7,8 +7,6 @@
 #include "python/frames.hpp"
 #include "twofold/calibration.hpp"
 
-namespace py = pybind11;
-
 namespace twofold::python {
 namespace {
 

@@ -102,7 +102,7 @@ void bind_pose(py::module_& module) {
           "__matmul__", [](const Pose& a, const Pose& b) { return compose(a, b); }, py::is_operator(),
           "T_a_c = T_a_b @ T_b_c; of points (3,) or (N, 3) [m], a new array of the same shape.")
       .def("__matmul__", &transform_points, py::is_operator())
-      .def(py::self == py::self)
+      .def(py::self == py::self)  // NOLINT(misc-redundant-expression): names the operator
       .def("__repr__", &text_of);
 }
 
