@@ -9,6 +9,7 @@
 #include "estimation/motion_only.hpp"
 #include "geometry/inverse_depth.hpp"
 #include "imaging/image_buffers.hpp"
+#include "tracking/monocular/metric_scale.hpp"
 
 namespace twofold {
 namespace {
@@ -66,7 +67,7 @@ tl::expected<MonocularStartResult, LostCause> MonocularStart::step(const FrameIm
   LostCause cause = LostCause::kTooLittleParallax;
   // The oldest one has seen most motion, and says what is missing.
   for (const std::size_t c : order_) {
-    const auto structure = examine(candidates_[c]);
+    const auto structure = examine(candidates_[c], images);
     if (structure) return MonocularStartResult{&candidates_[c], *structure};
     if (c == order_.front()) cause = structure.error();
   }
@@ -230,7 +231,8 @@ std::optional<Vector6> MonocularStart::velocity(const MonocularStartResult& star
   return (T_last_first * T_before_first.inverse()).log() / interval_;
 }
 
-tl::expected<FirstStructure, LostCause> MonocularStart::examine(const StartCandidate& candidate) const {
+tl::expected<FirstStructure, LostCause> MonocularStart::examine(const StartCandidate& candidate,
+                                                                const FrameImages& images) const {
   if (candidate.between.empty()) return tl::unexpected(LostCause::kTooLittleParallax);
   const auto as_pixels = [](const std::vector<Eigen::Vector2f>& places) {
     std::vector<Vector2> pixels;
@@ -247,7 +249,20 @@ tl::expected<FirstStructure, LostCause> MonocularStart::examine(const StartCandi
     views.last_motion.push_back(corner.motion.value_or(Eigen::Vector2f::Zero()).cast<double>());
   }
   for (const auto& places : candidate.between) views.between.push_back(as_pixels(places));
-  return first_structure(rig_, views, options_.monocular_start.first_structure);
+  auto structure = first_structure(rig_, views, options_.monocular_start.first_structure);
+  if (structure && rig_.kind == SensorKind::kRgbd && !to_metres(candidate, images, *structure))
+    return tl::unexpected(LostCause::kNoTexture);
+  return structure;
+}
+
+/// @return false where depth does not say how long the structure's unit is
+bool MonocularStart::to_metres(const StartCandidate& first, const FrameImages& images,
+                               FirstStructure& structure) const {
+  const auto metres = metric_scale(rig_, first.images, images, structure.T_last_first);
+  if (!metres) return false;
+  structure.T_last_first = {structure.T_last_first.so3(), *metres * structure.T_last_first.translation()};
+  for (Vector3& psi : structure.psi) psi.z() /= *metres;
+  return true;
 }
 
 /// Gives up candidates of which little is still in view.
@@ -279,6 +294,7 @@ void MonocularStart::fill(StartCandidate& candidate, const FrameImages& images, 
   candidate.t_ns = frame.t_ns;
   candidate.age = 0;
   candidate.images.left.copy_from(images.left);
+  if (rig_.kind == SensorKind::kRgbd) images.depth.copyTo(candidate.images.depth);
   candidate.wide = false;
   choose_corners(starter_, candidate);
   candidate.first_motion.clear();

@@ -50,10 +50,11 @@ struct MonocularStartResult {
 };
 
 /// Watches the frames of one camera until some earlier one and the newest show how it moves and how deep the
-/// scene is (first_structure). Several earlier frames are candidates, so that neither a pause nor a turn
-/// before the start matters. Across a step too wide to follow most corners a candidate takes more of them,
-/// which are found along epipolar lines (WideFollowing). Buffers are made at construction; a decision
-/// allocates: until there is a map, nobody depends on the tracker's time.
+/// scene is (first_structure); in metres, if it is a depth camera (metric_scale). Several earlier frames are
+/// candidates, so that neither a pause nor a turn before the start matters. Across a step too wide to follow
+/// most corners a candidate takes more of them, which are found along epipolar lines (WideFollowing). Buffers
+/// are made at construction; a decision allocates: until there is a map, nobody depends on the tracker's
+/// time.
 class MonocularStart {
  public:
   MonocularStart(const Rig& rig, const TrackerOptions& options);
@@ -84,7 +85,10 @@ class MonocularStart {
   [[nodiscard]] std::vector<Eigen::Vector2f> last_places(const StartCandidate& candidate) const;
   void remember_place(StartCandidate& candidate) const;
   void remember_path(std::int64_t frame_index, StartCandidate& candidate) const;
-  [[nodiscard]] tl::expected<FirstStructure, LostCause> examine(const StartCandidate& candidate) const;
+  [[nodiscard]] tl::expected<FirstStructure, LostCause> examine(const StartCandidate& candidate,
+                                                                const FrameImages& images) const;
+  [[nodiscard]] bool to_metres(const StartCandidate& first, const FrameImages& images,
+                               FirstStructure& structure) const;
   bool drop_unseen_candidates();
   void renew_candidates(const FrameImages& images, const Frame& frame);
   void remember_frame(const FrameImages& images, const Frame& frame);

@@ -45,7 +45,7 @@ Tracker::Tracker(const Rig& rig, const TrackerOptions& options)
   samples_.reserve(std::max({searches, kMaxImmaturePoints, kMaxAlignmentPoints}));
   last_.points.reserve(kMaxAlignmentPoints);
   if (rig.kind == SensorKind::kRgbd) depth_alignment_.emplace(rig, options.depth.alignment);
-  if (rig.kind == SensorKind::kMono) monocular_start_.emplace(rig, options);
+  if (rig.kind != SensorKind::kStereo) monocular_start_.emplace(rig, options);
   allocate_images(rig, current_);
   allocate_images(rig, last_.images);
   views_.prepare(last_.corners);
@@ -187,11 +187,12 @@ void Tracker::remember_frame(const FrameStep& step) {
     const SE3 T_row_ref = step.shutter.seen_from(rig_, result.T_c_ref, search_.observations[m].x_ref);
     last_.points.push_back({z.head<2>().cast<float>(), T_row_ref * search_.observations[m].x_ref});
   }
+  // One camera has no depth where it starts a point, and where motion began a map that was in an earlier
+  // frame.
+  const bool starts_points = result.proposed && rig_.kind != SensorKind::kMono && step.earlier_frames.empty();
   for (const ImmaturePoint& point : immature_points_.points()) {
-    if (last_.points.size() == last_.points.capacity()) break;
-    if (rig_.kind == SensorKind::kMono) break;  // it has no depth where it starts a point
-    const bool started_in_this_frame = result.proposed && proposer_.is_newest(point.anchor);
-    if (!started_in_this_frame) continue;
+    if (!starts_points || last_.points.size() == last_.points.capacity()) break;
+    if (!proposer_.is_newest(point.anchor)) continue;
     const Vector3 x_c = from_inverse_depth(point.psi);
     last_.points.push_back({point.appearance.uv, step.shutter.seen_from(rig_, SE3(), x_c) * x_c});
   }

@@ -36,11 +36,12 @@ namespace twofold {
 
 /// From images to poses: the stereo front-end of thesis 6.3, RGB-D as stereo with a virtual right image
 /// (6.5.3). One camera differs in where a point's depth comes from: at the start from its motion
-/// (MonocularStart), later from filters along epipolar lines (DepthSeeds); its unit of length is its own.
+/// (MonocularStart; of a depth camera, too, where little is within its reach), later from filters along
+/// epipolar lines (DepthSeeds); its unit of length is its own.
 ///
-/// Single-threaded and deterministic. Nothing is allocated after construction, except with one camera before
-/// it has started, or while it is lost and may start again; keyframes included if their buffers were
-/// prepared, and no reference count of a snapshot is touched. Work per frame is bounded by the options.
+/// Single-threaded and deterministic. Nothing is allocated after construction, except for a start by motion,
+/// before there is a map or while the camera is lost and may start again; keyframes included if their buffers
+/// were prepared, and no reference count of a snapshot is touched. Work per frame is bounded by the options.
 ///
 /// The tracker's own pose is relative to a reference keyframe, so that it moves along when a newer snapshot
 /// moves that keyframe.
@@ -162,6 +163,8 @@ class Tracker {
   // tracker_one_camera.cpp: depth from motion
   LostCause start_from_motion(FrameStep& step);
   LostCause confirm_start(const MonocularStartResult& start, FrameStep& step);
+  [[nodiscard]] ImmaturePoint point_of_start(const MonocularStartResult& start, std::size_t n,
+                                             KeyframeId id) const;
   void observe_seeds(const FrameStep& step);
   [[nodiscard]] bool needs_rays(const TrackResult& result);
 
@@ -195,7 +198,7 @@ class Tracker {
   bool unplaced_ = false;
 
   NewPoints new_points_;
-  std::optional<MonocularStart> monocular_start_;  ///< one camera only
+  std::optional<MonocularStart> monocular_start_;  ///< but for stereo
   KeyframeProposer proposer_;
   ReferenceChoice reference_choice_;
 

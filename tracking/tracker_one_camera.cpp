@@ -1,6 +1,7 @@
 // What one camera does otherwise, it starts when its motion shows depth, and what all do where none is
 // measured: points ripen before they are used.
 #include "geometry/inverse_depth.hpp"
+#include "imaging/guided_search.hpp"
 #include "tracking/tracker.hpp"
 
 namespace twofold {
@@ -20,7 +21,7 @@ LostCause Tracker::start_from_motion(FrameStep& step) {
   KeyframeProposal& proposal = *step.free_proposal;
   proposal.frame_index = first.frame_index;
   proposal.t_ns = first.t_ns;
-  proposal.images.left.copy_from(first.images.left);
+  proposal.images.copy_from(first.images);
   // As if the camera had moved evenly since: that is the next frame's prediction.
   const double share = static_cast<double>(first.age - 1) / first.age;
   const auto since_first = static_cast<double>(step.frame.t_ns - first.t_ns);
@@ -41,15 +42,7 @@ LostCause Tracker::confirm_start(const MonocularStartResult& start, FrameStep& s
   immature_points_.clear_points();
   new_points_.forget_seeds();
   for (std::size_t n = 0; n < start.structure.corners.size(); ++n) {
-    const auto corner = static_cast<std::size_t>(start.structure.corners[n]);
-    ImmaturePoint point;
-    point.anchor = point.usable_since = id;
-    point.psi = start.structure.psi[n];
-    point.appearance = start.first->corners[corner].appearance;
-    const Eigen::Vector2f uv = monocular_start_->first_place(*start.first, corner).cast<float>();
-    point.anchor_observation.pixel = {uv.x(), uv.y(), static_cast<float>(Rig::kNoRight)};
-    point.anchor_observation.level = point.appearance.level;
-    if (!immature_points_.add(point)) break;
+    if (!immature_points_.add(point_of_start(start, n, id))) break;
   }
   const Placement placement{id, start.structure.T_last_first};
   collect_local_map(id, step);
@@ -64,6 +57,22 @@ LostCause Tracker::confirm_start(const MonocularStartResult& start, FrameStep& s
   }
   step.result.cause = LostCause::kNone;
   return LostCause::kNone;
+}
+
+/// The n-th point of a start, anchored in its first frame: as deep as measured there, or as motion showed.
+ImmaturePoint Tracker::point_of_start(const MonocularStartResult& start, std::size_t n, KeyframeId id) const {
+  const StartCandidate& first = *start.first;
+  const auto corner = static_cast<std::size_t>(start.structure.corners[n]);
+  ImmaturePoint point;
+  point.anchor = point.usable_since = id;
+  point.psi = start.structure.psi[n];
+  point.appearance = first.corners[corner].appearance;
+  const Vector2 uv = monocular_start_->first_place(first, corner);
+  const double u_r = right_of_corner(first.images, rig_, uv, point.appearance.level, options_.search);
+  if (has_right(u_r)) point.psi.z() = 1 / rig_.depth_from_disparity(uv.x() - u_r);
+  point.anchor_observation.pixel = StereoPixel(uv.x(), uv.y(), u_r).cast<float>();
+  point.anchor_observation.level = point.appearance.level;
+  return point;
 }
 
 /// Few points of known depth are found, and the camera hardly moves: corners without depth say how it turns.

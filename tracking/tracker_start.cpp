@@ -45,7 +45,7 @@ LostCause Tracker::make_first_keyframe(FrameStep& step) {
     if (monocular_start_) monocular_start_->watch(current_, step.frame);
     return LostCause::kNoKeyframeBuffer;
   }
-  if (monocular_start_) return start_from_motion(step);
+  if (rig_.kind == SensorKind::kMono) return start_from_motion(step);
   const KeyframeId id = proposer_.next();
   step.shutter = {};  // how the camera moves is not known yet
   immature_points_.clear_points();
@@ -55,6 +55,8 @@ LostCause Tracker::make_first_keyframe(FrameStep& step) {
     const LostCause open = judge_structure(step);
     if (open != LostCause::kNone) {
       immature_points_.clear_points();
+      // A depth camera beyond its reach sees as much as one camera does.
+      if (monocular_start_ && start_from_motion(step) == LostCause::kNone) return LostCause::kNone;
       return open == LostCause::kNoStructure ? open : LostCause::kNoTexture;
     }
     step.result.by_depth = true;

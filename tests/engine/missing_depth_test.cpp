@@ -45,9 +45,10 @@ Found found(const testing::WholeRun& run, const Trajectory& truth) {
   return found;
 }
 
-/// It starts where forty corners are within reach. With such corners alone that ends soon.
+/// Hardly a corner is within reach: it starts by motion, and the depth of a strip of the ground says how far
+/// that was. With corners that have a depth alone it ends soon.
 TEST(MissingDepth, ADepthCameraGoesOnBeyondItsReach) {
-  for (const std::uint64_t seed : {1, 2}) {
+  for (const std::uint64_t seed : {1, 2, 9, 12}) {
     SyntheticOptions scene = courtyard(SensorKind::kRgbd);
     scene.seed = seed;
     scene.depth_max = 3;
@@ -59,10 +60,10 @@ TEST(MissingDepth, ADepthCameraGoesOnBeyondItsReach) {
     by_depth_alone.tracker.new_points.crowded_below = 0;
     const Found without =
         found(testing::run_whole(sequence.rig(), testing::frames_of(sequence), by_depth_alone), truth);
-    EXPECT_LT(without.path.size(), 20U) << "or this test says nothing";
+    EXPECT_LT(without.path.size(), 80U) << "or this test says nothing";
     const Found with = found(testing::run_whole(sequence.rig(), testing::frames_of(sequence)), truth);
-    EXPECT_GT(with.path.size(), 120U) << "seed " << seed;
-    EXPECT_LT(with.ate, 0.15) << "seed " << seed;
+    EXPECT_GE(with.path.size(), 195U) << "seed " << seed;
+    EXPECT_LT(with.ate, 0.06) << "seed " << seed;
   }
 }
 

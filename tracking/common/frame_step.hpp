@@ -62,7 +62,8 @@ class FrameStep : public Attempt {
   bool depth_refused = false;  ///< the pose that it gave, for what the points found say of it
   bool tracked = false;        ///< in the map that there was
   bool started = false;        ///< a map or map part, with this frame
-  /// One camera: frames before this one whose poses its start found out, relative to the reference keyframe.
+  /// Of a start by motion: frames before this one whose poses its start found out, relative to the reference
+  /// keyframe.
   std::vector<EarlierFrame> earlier_frames;
 
   /// The frame before this one has no pose.
