@@ -236,6 +236,7 @@ tl::expected<FirstStructure, LostCause> MonocularStart::examine(const StartCandi
   if (candidate.between.empty()) return tl::unexpected(LostCause::kTooLittleParallax);
   const auto as_pixels = [](const std::vector<Eigen::Vector2f>& places) {
     std::vector<Vector2> pixels;
+    pixels.reserve(places.size());
     for (const Eigen::Vector2f& uv : places) pixels.push_back(uv.cast<double>());
     return pixels;
   };
