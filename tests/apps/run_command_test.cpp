@@ -196,6 +196,7 @@ pid_t start_at_a_pace(const fs::path& recording, const std::string& out) {
   const pid_t program = fork();
   if (program == 0) {
     const std::string source = "kitti:" + recording.string();
+    std::signal(SIGHUP, SIG_DFL);  // the tests may run under nohup
     execl(TWOFOLD_BINARY, TWOFOLD_BINARY, "run", source.c_str(), "--preload", "--speed", "0.3", "--quiet",
           "--out", out.c_str(), nullptr);
     _exit(127);
