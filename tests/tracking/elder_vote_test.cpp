@@ -114,6 +114,28 @@ TEST_F(ElderVoteTest, TheYoungThatGoWithTheEldersAreNotMistrusted) {
   EXPECT_FALSE(ask());
 }
 
+/// A map whose unit drifts has old points where new ones contradict them, now more, now less. What passes
+/// brings far more at once.
+TEST_F(ElderVoteTest, WhatOldAndNewPointsUsuallyDifferByIsNoDissent) {
+  const auto ask_where_the_young_moved = [&](double x) {
+    random_.seed(3);  // the same points each time
+    observations_.clear();
+    anchors_.clear();
+    add(60, KeyframeId{0}, Vector3::Zero());
+    add(100, KeyframeId{7}, Vector3(x, 0, 0));
+    return ask().has_value();
+  };
+  const auto forget = [&] { vote_ = ElderVote(rig_, 300, {}); };
+  double dissent = 0.012;  // as far as the young must have moved to be overruled where nothing else is usual
+  for (; !ask_where_the_young_moved(dissent); forget()) dissent *= 1.02;
+  ASSERT_LT(dissent, 0.05);
+  forget();
+  for (int frame = 0; frame < 40; ++frame) ASSERT_FALSE(ask_where_the_young_moved(dissent / 1.1)) << frame;
+  EXPECT_FALSE(ask_where_the_young_moved(dissent));
+  EXPECT_FALSE(vote_.mistrusts_the_young());
+  EXPECT_TRUE(ask_where_the_young_moved(0.1));
+}
+
 /// Far elders in the middle of the image hardly know how the camera is turned about its axis; where some of
 /// them were found beside where they are, these decide. The nearer young know it.
 TEST_F(ElderVoteTest, MistakesAmongFarEldersDoNotOverruleWhatTheMostOfThemSee) {

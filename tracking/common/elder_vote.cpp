@@ -10,6 +10,11 @@
 #include "estimation/observation_model.hpp"
 
 namespace twofold {
+namespace {
+
+constexpr double kExpected = 6;  // squared distance of poses, which have so many dimensions
+
+}  // namespace
 
 std::string ElderVoteOptions::invalid_reason() const {
   return OptionCheck()
@@ -17,6 +22,7 @@ std::string ElderVoteOptions::invalid_reason() const {
       .at_least("min_elders", min_elders, 3)
       .share("min_agreeing_share", min_agreeing_share)
       .above("dissent", dissent, 0)
+      .share("newest_usual", newest_usual)
       .share("min_convinced_share", min_convinced_share)
       .share("min_loyal_share", min_loyal_share)
       .at_least("mistrusted_frames", mistrusted_frames, 0)
@@ -35,6 +41,7 @@ ElderVote::Verdict ElderVote::ask(std::span<MotionObservation> observations,
                                   const MotionOnlyOptions& solver) {
   const bool mistrusted = mistrusts_the_young();
   Verdict verdict;
+  verdict.usual = usual_;
   if (mistrusted) verdict.mistrusted_for = mistrusted_for_ - 1;
   if (!choose_elders(observations, anchors)) return verdict;
   MotionOnlyResult by_elders = optimise_motion(rig_, elders_, by_all.T_c_ref, solver);
@@ -43,13 +50,21 @@ ElderVote::Verdict ElderVote::ask(std::span<MotionObservation> observations,
   if (mistrusted) by_elders = settle_elders(by_elders, solver);
   const Vector6 apart = (by_all.T_c_ref * by_elders.T_c_ref.inverse()).log();
   verdict.difference = split_factor(by_all.information, by_elders.information, apart);
-  const bool dissent = apart.dot(by_elders.information * apart) > options_.dissent * options_.dissent &&
-                       elders_nearer_to(by_elders.T_c_ref, by_all.T_c_ref) >= options_.min_convinced_share;
+  const double distance = apart.dot(by_elders.information * apart);
+  const double bound = options_.dissent * options_.dissent * std::max(1.0, usual_ / kExpected);
+  const bool dissent =
+      distance > bound && elders_nearer_to(by_elders.T_c_ref, by_all.T_c_ref) >= options_.min_convinced_share;
+  // One frame beyond the bound, of whose poses one may be anywhere, says no more than one at the bound.
+  const double usual = usual_ + options_.newest_usual * (std::min(distance, bound) - usual_);
+  if (!mistrusted) verdict.usual = usual;
   if (!dissent && !mistrusted) return verdict;  // nearly always
   const int with_elders = young_inliers(observations, anchors, by_elders.T_c_ref, solver);
   const int with_all = young_inliers(observations, anchors, by_all.T_c_ref, solver);
   const bool misled = dissent && with_elders < options_.min_loyal_share * with_all;
-  if (misled) verdict.mistrusted_for = options_.mistrusted_frames;
+  if (misled) {
+    verdict.mistrusted_for = options_.mistrusted_frames;
+    verdict.usual = usual_;
+  }
   if (!misled && !mistrusted) return verdict;
   by_elders.inliers = classify_observations(rig_, observations, by_elders.T_c_ref, solver);
   verdict.by_elders = by_elders;

@@ -16,7 +16,8 @@ struct ElderVoteOptions {
   double share = 1.0 / 3;           ///< of the observations: so many are elders at least, in (0, 1]
   int min_elders = 40;              ///< fewer overrule nobody, >= 3
   double min_agreeing_share = 0.7;  ///< share of the elders that the pose they give must explain, in (0, 1]
-  double dissent = 4;  ///< between the two poses, in standard deviations of the elders' pose, > 0
+  double dissent = 4;         ///< between the two poses, in standard deviations of the elders' pose, > 0 ...
+  double newest_usual = 0.1;  ///< ... as they usually are: share of the newest frame in that, in (0, 1]
   /// Share of the elders that must lie nearer to where their pose says than to where that of all does:
   /// in (0, 1].
   double min_convinced_share = 2.0 / 3;
@@ -37,7 +38,12 @@ struct ElderVoteOptions {
 /// the pose of all contradict it, the young move: they are overruled, and for a while their votes do not
 /// count.
 ///
-/// One instance a tracker: it remembers whom it mistrusts. No allocation after construction.
+/// Standard deviations are those of the rig's noise, unless elders and all usually differ by more: where
+/// images have more noise, or the map's unit of length drifts, so that old points are in another one than
+/// new. What passes adds a contradiction that was not there before.
+///
+/// One instance a tracker: it remembers whom it mistrusts, and what is usual. No allocation after
+/// construction.
 class ElderVote {
  public:
   /// Of one frame.
@@ -48,6 +54,7 @@ class ElderVote {
     /// could say.
     std::optional<double> difference;
     int mistrusted_for = 0;  ///< frames for which nobody asks the young, from the next one on
+    double usual = 0;        ///< ElderVote::usual_ from the next frame on
   };
 
   ElderVote(const Rig& rig, std::size_t capacity, const ElderVoteOptions& options);
@@ -60,7 +67,10 @@ class ElderVote {
                             const MotionOnlyResult& by_all, const MotionOnlyOptions& solver);
 
   /// What a verdict means for the next ones.
-  void remember(const Verdict& verdict) { mistrusted_for_ = verdict.mistrusted_for; }
+  void remember(const Verdict& verdict) {
+    mistrusted_for_ = verdict.mistrusted_for;
+    usual_ = verdict.usual;
+  }
 
   /// The young were overruled lately.
   [[nodiscard]] bool mistrusts_the_young() const { return mistrusted_for_ > 0; }
@@ -76,7 +86,10 @@ class ElderVote {
 
   Rig rig_;
   ElderVoteOptions options_;
-  int mistrusted_for_ = 0;                   ///< [frames]
+  int mistrusted_for_ = 0;  ///< [frames]
+  /// Squared distance between the elders' pose and that of all, in variances of the former by the rig's
+  /// noise: smoothed over the frames in which nobody was overruled.
+  double usual_ = 0;
   KeyframeId youngest_elder_ = kNoKeyframe;  ///< anchor
   std::vector<KeyframeId> by_age_;
   std::vector<MotionObservation> elders_;
