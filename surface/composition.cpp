@@ -24,6 +24,23 @@ std::size_t Composition::update(std::span<const PlacedVolume> volumes, double re
   return blocks;
 }
 
+bool Composition::rejoin_farthest(std::span<const PlacedVolume> volumes) {
+  auto farthest = members_.end();
+  double most = kRest * whole_.options().voxel;
+  for (const PlacedVolume& volume : volumes) {
+    const auto member = members_.find(volume.id);
+    if (member == members_.end()) continue;
+    const double way = farthest_way(member->second, member->second.T_w_v, volume.T_w_v);
+    if (way <= most) continue;
+    most = way;
+    farthest = member;
+  }
+  if (farthest == members_.end()) return false;
+  remove(farthest->first, farthest->second);
+  members_.erase(farthest);
+  return true;
+}
+
 bool Composition::move_mesh(std::span<const PlacedVolume> volumes) {
   std::vector<Moved> all;
   bool any = false;
@@ -32,7 +49,7 @@ bool Composition::move_mesh(std::span<const PlacedVolume> volumes) {
     const auto at = mesh_at_.find(volume.id);
     if (member == members_.end() || at == mesh_at_.end()) continue;
     Moved moved{volume.volume, at->second.inverse(), Motion::Identity()};
-    if (farthest_way(member->second, at->second, volume.T_w_v) > kRest * whole_.options().voxel) {
+    if (farthest_way(member->second, at->second, volume.T_w_v) > rest_ * whole_.options().voxel) {
       moved.motion = (volume.T_w_v * at->second.inverse()).matrix().topRows<3>();
       at->second = volume.T_w_v;
       any = true;

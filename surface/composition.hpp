@@ -25,25 +25,31 @@ struct PlacedVolume {
 /// called. One thread at a time.
 class Composition {
  public:
-  explicit Composition(const SurfaceOptions& options) : whole_(options) {}
+  /// @param rest  [voxels] a volume that has moved by no more than this stays where it was in an update, and
+  /// in
+  ///              the mesh, because poses never rest while the map grows
+  explicit Composition(const SurfaceOptions& options, double rest = kRest) : whole_(options), rest_(rest) {}
 
   /// Asked now and then while blocks are made anew, with the share that is done.
   using GivesUp = std::function<bool(double done)>;
 
-  /// The volumes there are now, ascending by id. One that moved by no more than half a voxel stays
-  /// where it was, because poses never rest while the map grows.
+  /// The volumes there are now, ascending by id.
   ///
   /// @param gives_up  true: the remaining blocks, and the mesh, are left to the next call, since the
   ///                  volumes have moved again meanwhile
   /// @return  blocks made anew
   std::size_t update(std::span<const PlacedVolume> volumes, const GivesUp& gives_up = {}) {
-    return update(volumes, kRest, gives_up);
+    return update(volumes, rest_, gives_up);
   }
   /// As update, but volumes stand exactly where they are said to.
   std::size_t settle(std::span<const PlacedVolume> volumes) { return update(volumes, 0, {}); }
-  /// Moves the mesh as volumes have moved by more than half a voxel since it was made: each piece by the mean
-  /// of those that have surface there. They are joined anew by the next update, which takes far longer: a
-  /// wall that is twice in the mesh remains so until then.
+  /// The volume that moved farthest since it was joined is joined anew by the next update, if it moved by
+  /// more than half a voxel: one at a time, where time is left.
+  /// @return  whether there is one
+  bool rejoin_farthest(std::span<const PlacedVolume> volumes);
+  /// Moves the mesh as volumes have moved that may not rest since it was made: each piece by the mean of
+  /// those that have surface there. They are joined anew by the next update, which takes far longer: a wall
+  /// that is twice in the mesh remains so until then.
   /// @return  whether any moved
   bool move_mesh(std::span<const PlacedVolume> volumes);
   /// Whether the last call of update gave up.
@@ -81,6 +87,7 @@ class Composition {
   std::size_t compose(std::span<const PlacedVolume> volumes, const GivesUp& gives_up);
 
   SurfaceVolume whole_;
+  double rest_;
   MeshPieces mesh_;
   std::map<std::uint32_t, Member> members_;
   std::map<std::uint32_t, SE3> mesh_at_;              ///< T_w_v of the volumes in the mesh

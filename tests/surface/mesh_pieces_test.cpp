@@ -182,6 +182,29 @@ TEST_F(CompositionTest, FollowsOnlyWhatMovesByHalfAVoxel) {
   EXPECT_TRUE(composition_.mesh().joined(options().min_triangles) == mesh_of_all());
 }
 
+TEST_F(CompositionTest, WhatMayRestIsJoinedAnewOneByOneTheFarthestFirst) {
+  Composition patient(options(), 2);
+  patient.update(placed_);
+  const std::vector<PlacedVolume> before = placed_;
+  move(0, 1.0 * options().voxel);
+  move(1, 0.4 * options().voxel);
+  move(2, 1.5 * options().voxel);
+  EXPECT_EQ(patient.update(placed_), 0u);
+  for (const std::size_t next : {2u, 0u}) {
+    ASSERT_TRUE(patient.rejoin_farthest(placed_));
+    EXPECT_GT(patient.update(placed_), 0u);
+    std::vector<PlacedVolume> now = before;
+    now[2] = placed_[2];
+    if (next == 0) now[0] = placed_[0];
+    Composition wanted(options());
+    wanted.update(now);
+    EXPECT_TRUE(patient.mesh().joined(0) == wanted.mesh().joined(0)) << "volume " << next;
+  }
+  EXPECT_FALSE(patient.rejoin_farthest(placed_)) << "less than half a voxel";
+  move(1, 2.0 * options().voxel);
+  EXPECT_GT(patient.update(placed_), 0u) << "more than may rest";
+}
+
 TEST_F(CompositionTest, KeepsNoBlocksWhereNothingIsAnyMore) {
   composition_.update(placed_);
   const std::size_t once = composition_.whole().blocks().size();

@@ -27,7 +27,7 @@ void LiveMesh::follow(const SubmapSurface& surface, const GraphSnapshot& graph) 
 bool LiveMesh::update(const SubmapSurface& surface, const GraphSnapshot& graph,
                       const Composition::GivesUp& gives_up) {
   if (graph.reference() == kNoKeyframe) return true;
-  const KeyframeId part = graph.part(graph.reference());
+  const KeyframeId part = part_ = graph.part(graph.reference());
   followed_to_.clear();
   const std::int64_t begin_ns = thread_cpu_ns();
   const std::size_t blocks = composition_.update(surface.placed(part), gives_up);
@@ -43,6 +43,10 @@ bool LiveMesh::update(const SubmapSurface& surface, const GraphSnapshot& graph,
   take_times(graph.version());
   take_settled(surface);
   return true;
+}
+
+bool LiveMesh::rejoin_farthest(const SubmapSurface& surface) {
+  return part_ != kNoKeyframe && composition_.rejoin_farthest(surface.placed(part_));
 }
 
 void LiveMesh::tell(KeyframeId part) {

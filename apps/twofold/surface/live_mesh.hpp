@@ -31,7 +31,7 @@ class LiveMesh {
   using Listener = std::function<void(const MeshPieces& mesh, KeyframeId part)>;
 
   LiveMesh(const SurfaceOptions& options, Listener listener)
-      : composition_(options), listener_(std::move(listener)) {}
+      : composition_(options, kAtOnce), listener_(std::move(listener)) {}
 
   /// The mapper's thread, when a map is published: a clock is read, and a ring written.
   void published(const GraphSnapshot& graph);
@@ -45,10 +45,18 @@ class LiveMesh {
   /// @return  false: it gave up
   bool update(const SubmapSurface& surface, const GraphSnapshot& graph,
               const Composition::GivesUp& gives_up = {});
+  /// The surface's thread, where time is left: what has moved by little and was not joined anew for it yet
+  /// is, one submap at a time, by the next update.
+  /// @return  whether there is any
+  bool rejoin_farthest(const SubmapSurface& surface);
   /// After the run.
   [[nodiscard]] LiveMeshFigures figures() const;
 
  private:
+  /// [voxels] What moves farther is joined anew before new keyframes are in the mesh. Two images of a wall
+  /// that are this far apart are still averaged into one, not two walls.
+  static constexpr double kAtOnce = 2;
+
   void read_times();
   void take_followed(std::uint64_t version);
   void take_times(std::uint64_t version);
@@ -56,6 +64,7 @@ class LiveMesh {
   void take_settled(const SubmapSurface& surface);
 
   Composition composition_;
+  KeyframeId part_ = kNoKeyframe;  // that it is of
   Listener listener_;
   std::uint64_t revision_ = 0;             // that the listener knows
   SpscRing<MapTime> times_{4096};          // mapper -> surface

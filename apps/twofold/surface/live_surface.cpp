@@ -19,7 +19,8 @@
 namespace twofold {
 namespace {
 
-constexpr SubmapWork kWork{.keyframes = 4, .anew = 1};  // at a time: some tenths of a second
+constexpr std::size_t kMostFrames = 4;  // at a time: a tenth of a second
+constexpr int kMostPutOff = 3;          // steps after which what waits is done, whatever else does
 constexpr auto kMapCheck = std::chrono::milliseconds(20);
 
 }  // namespace
@@ -133,7 +134,7 @@ void LiveSurface::work(const std::stop_token& stop) {
     }
     if (stop.stop_requested()) return;  // the caller takes the rest
     const std::int64_t begin_ns = thread_cpu_ns();
-    step(kWork.keyframes);
+    step(kMostFrames);
     const double rest_ns = static_cast<double>(thread_cpu_ns() - begin_ns) * (1 / arguments_.load - 1);
     std::unique_lock lock(mutex_);
     (void)arrived_.wait_for(lock, stop, std::chrono::nanoseconds(std::llround(rest_ns)),
@@ -149,8 +150,14 @@ void LiveSurface::step(std::size_t most_frames) {
       taken.push_back(std::move(keyframes_.front()));
   }
   const bool moved = maps_.newest()->graph.version() != version_;
-  if (!moved && taken.empty() && !surface_->unfinished()) return;
-  if (mesh_ && moved) follow_map();
+  if (moved || !taken.empty() || surface_->unfinished()) fuse(std::move(taken));
+  if (!mesh_ || (something_waits() && ++put_off_ < kMostPutOff)) return;
+  put_off_ = 0;
+  catch_up();
+}
+
+void LiveSurface::fuse(Keyframes taken) {
+  if (mesh_) follow_map();
   for (auto& [frame, row_offset] : taken) {
     take(frame, row_offset);
     frame = {};
@@ -158,8 +165,23 @@ void LiveSurface::step(std::size_t most_frames) {
   if (mesh_ && loop_came()) follow_map();
   const auto map = maps_.newest();
   version_ = map->graph.version();
-  surface_->step(map->graph, mesh_ ? kWork : SubmapWork{});
+  surface_->step(map->graph, mesh_ ? SubmapWork{.keyframes = kMostFrames, .anew = 0} : SubmapWork{});
   if (mesh_) follow_map();
+}
+
+bool LiveSurface::something_waits() {
+  const std::scoped_lock lock(mutex_);
+  return !keyframes_.empty() || maps_.newest()->graph.version() != version_;
+}
+
+/// One thing at a time, so that what comes waits for no more: a bent submap is fused anew, or the mesh gets
+/// one where it is now that has moved by little.
+void LiveSurface::catch_up() {
+  if (surface_->bent() > 0)
+    surface_->step(maps_.newest()->graph, {.keyframes = 0, .anew = 1});
+  else if (!mesh_->rejoin_farthest(*surface_))
+    return;
+  follow_map();
 }
 
 /// A loop is in the mesh before more is fused: moved at once, then with the submaps joined anew. Where
