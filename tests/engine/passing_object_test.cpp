@@ -63,6 +63,16 @@ TEST(PassingObject, DoesNotTakeTheCameraAlongWhenItIsSlow) {
   }
 }
 
+/// What grows slowly must not become what is usual.
+TEST(PassingObject, DoesNotTakeTheCameraAlongWhenItSetsOffSlowly) {
+  for (const double share : {0.3, 0.4, 0.5}) {
+    for (const double faster : {0.05, 0.1}) {
+      SCOPED_TRACE(::testing::Message() << share << ", " << faster);
+      EXPECT_LT(farthest({.share = share, .px_a_frame = 0, .faster = faster, .first_frame = 20}), 0.02);
+    }
+  }
+}
+
 /// So fast that points which it hides are found on it, by chance.
 TEST(PassingObject, DoesNotTakeTheCameraAlongWhenItIsFast) {
   for (const double share : {0.3, 0.4, 0.5}) {

@@ -150,13 +150,13 @@ void LiveSurface::step(std::size_t most_frames) {
       taken.push_back(std::move(keyframes_.front()));
   }
   const bool moved = maps_.newest()->graph.version() != version_;
-  if (moved || !taken.empty() || surface_->unfinished()) fuse(std::move(taken));
+  if (moved || !taken.empty() || surface_->unfinished()) fuse(taken);
   if (!mesh_ || (something_waits() && ++put_off_ < kMostPutOff)) return;
   put_off_ = 0;
   catch_up();
 }
 
-void LiveSurface::fuse(Keyframes taken) {
+void LiveSurface::fuse(Keyframes& taken) {
   if (mesh_) follow_map();
   for (auto& [frame, row_offset] : taken) {
     take(frame, row_offset);

@@ -78,8 +78,8 @@ class LiveSurface {
   void work(const std::stop_token& stop);
   /// Takes the oldest of the frames that wait, and the newest map.
   void step(std::size_t most_frames = kMostWaiting);
-  /// New keyframes first; with a mesh, what has waited longer is left to catch_up.
-  void fuse(Keyframes taken);
+  /// New keyframes first; with a mesh, what has waited longer is left to catch_up. Lets go of the images.
+  void fuse(Keyframes& taken);
   void catch_up();
   /// A keyframe's images, or a map that was not looked at.
   [[nodiscard]] bool something_waits();
