@@ -78,7 +78,7 @@ struct SubmapReport {
 ///
 /// Each keyframe's depth is fused into the submap that it shares most points with, or begins one. A submap
 /// stands still relative to one of its keyframes: a loop moves it as a whole. It begins on the world's grid
-/// of samples, so that nothing is resampled in a Composition while it has moved by less than half a voxel.
+/// of samples, so that nothing is resampled in a Composition while it has moved by no more than may rest.
 /// When poses inside a group moved against each other by more than half a voxel, at the depth that is seen,
 /// the submap is bent, and fused anew. Culled keyframes give up their depth, and what they had added remains
 /// until then; a submap that has none left goes. So memory follows the place. Same calls, same bytes; one

@@ -212,8 +212,10 @@ class TWOFOLD_API Slam {
   /// Throws std::invalid_argument when rig or options make no sense, naming the field, and std::runtime_error
   /// when a file cannot be used or the rig is not the map's. One that was calibrated again is, and
   /// SlamSummary::notes tells what differs, if its size is the same and nothing is seen by more than a pixel
-  /// elsewhere than with the map's intrinsics and baseline; else the reason has the numbers. A processor or
-  /// priority that the system refuses is no error: SlamSummary::notes tells.
+  /// elsewhere than with the map's intrinsics and baseline; else the reason has the numbers. One camera with
+  /// SlamOptions::localise_only in a rig's map may be any whose fx and fy are the rig's within 3 %; without,
+  /// it is refused there. A processor or priority that the system refuses is no error: SlamSummary::notes
+  /// tells.
   Slam(const CameraRig& rig, const SlamOptions& options);
   /// Finishes, after end_pace.
   ~Slam();

@@ -16,8 +16,8 @@ struct ElderVoteOptions {
   double share = 1.0 / 3;           ///< of the observations: so many are elders at least, in (0, 1]
   int min_elders = 40;              ///< fewer overrule nobody, >= 3
   double min_agreeing_share = 0.7;  ///< share of the elders that the pose they give must explain, in (0, 1]
-  double dissent = 4;         ///< between the two poses, in standard deviations of the elders' pose, > 0 ...
-  double newest_usual = 0.1;  ///< ... as they usually are: share of the newest frame in that, in (0, 1]
+  double dissent = 4;         ///< between the two poses, in standard deviations of the elders' pose, > 0
+  double newest_usual = 0.1;  ///< weight of the newest frame in the mean of that distance, in (0, 1]
   /// Share of the elders that must lie nearer to where their pose says than to where that of all does:
   /// in (0, 1].
   double min_convinced_share = 2.0 / 3;
@@ -40,7 +40,8 @@ struct ElderVoteOptions {
 ///
 /// Standard deviations are those of the rig's noise, unless elders and all usually differ by more: where
 /// images have more noise, or the map's unit of length drifts, so that old points are in another one than
-/// new. What passes adds a contradiction that was not there before.
+/// new. What passes adds a contradiction that was not there before; one that comes slowly raises what is
+/// usual, in no frame by more than one at the bound does.
 ///
 /// One instance a tracker: it remembers whom it mistrusts, and what is usual. No allocation after
 /// construction.

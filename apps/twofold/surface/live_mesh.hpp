@@ -24,7 +24,9 @@ struct MapTime {
 };
 
 /// The mesh of the map part that the reference keyframe is in, kept up to date while the run lasts, and how
-/// far it is behind the map.
+/// far it is behind the map: from when a version is published until all its keyframes are in the mesh, and
+/// all submaps that moved by more than kAtOnce are joined where they are now. Submaps that moved by less, or
+/// whose keyframes moved against each other, may follow later.
 class LiveMesh {
  public:
   /// Told of the mesh each time it changed, on the thread that calls update.
