@@ -25,9 +25,8 @@ struct PlacedVolume {
 /// called. One thread at a time.
 class Composition {
  public:
-  /// @param rest  [voxels] a volume that has moved by no more than this stays where it was in an update, and
-  /// in
-  ///              the mesh, because poses never rest while the map grows
+  /// @param rest  [voxels] a volume that has moved by no more than this stays where it was, in an update and
+  ///              in the mesh, because poses never rest while the map grows
   explicit Composition(const SurfaceOptions& options, double rest = kRest) : whole_(options), rest_(rest) {}
 
   /// Asked now and then while blocks are made anew, with the share that is done.
