@@ -6,13 +6,15 @@
 
 namespace twofold {
 
+/// Depth over how far aside, of the flattest ray that is looked for: no image is 2000 focal lengths wide.
+inline constexpr double kFlattestRay = 1e-3;
+
 /// Whether a point in the camera frame can be looked for in an image: one behind the camera has no
 /// projection, and none that a pinhole camera sees lies straight to its side. How far away it is does not
 /// count, because one camera's unit is arbitrary: who starts high above the ground lands at a thousandth of
 /// it. So x_c may have any length, as inverse depth coordinates give it, h = q x_c.
 [[nodiscard]] inline bool in_front_of_camera(const Vector3& x_c) {
-  constexpr double kFlattest = 1e-3;  // depth over how far aside: no image is 2000 focal lengths wide
-  return x_c.z() > kFlattest * x_c.head<2>().lpNorm<Eigen::Infinity>();
+  return x_c.z() > kFlattestRay * x_c.head<2>().lpNorm<Eigen::Infinity>();
 }
 
 /// Pinhole camera without distortion  (thesis eq. 3.3, with fx != fy allowed).

@@ -210,38 +210,20 @@ class FirstStructureEstimator {
            T_a.translation().normalized().dot(T_b.translation().normalized()) < options_.same_direction;
   }
 
-  /// Squared whitened error of a point in the frame that it fits least.
-  [[nodiscard]] double worst_chi2(const AnchoredViews& views, std::size_t k) const {
-    double worst = prior_chi2(views.points[k]);
-    for (const AnchoredViews::View& view : views.views)
-      worst = std::max(worst, chi2(view, views.points[k], k));
-    return worst;
-  }
-  [[nodiscard]] static double prior_chi2(const AnchoredViews::Point& point) {
-    const Vector3 moved = point.psi - point.psi_prior;
-    return moved.dot(point.prior * moved);
-  }
-  [[nodiscard]] double chi2(const AnchoredViews::View& view, const AnchoredViews::Point& point,
-                            std::size_t k) const {
-    const auto p = project_inverse_depth(rig_, view.T_c_a, point.psi);
-    if (!p) return std::numeric_limits<double>::infinity();
-    return ((p->z_hat - view.seen[k].pixel).head<2>() / options_.sigma_px).squaredNorm();
-  }
-
   void put_outliers_aside(double bound, Trial& trial) const {
     AnchoredViews& views = trial.views;
+    const std::vector<double> errors = views.worst_errors();
     std::size_t kept = 0;
     for (std::size_t k = 0; k < views.points.size(); ++k) {
-      if (!(worst_chi2(views, k) < bound)) continue;
+      if (!(errors[k] < bound)) continue;
       views.points[kept] = views.points[k];
       trial.corners[kept] = trial.corners[k];
-      for (AnchoredViews::View& view : views.views)
-        view.seen[kept] = {static_cast<int>(kept), view.seen[k].pixel};
+      for (AnchoredViews::View& view : views.views) view.pixels[kept] = view.pixels[k];
       ++kept;
     }
     views.points.resize(kept);
     trial.corners.resize(kept);
-    for (AnchoredViews::View& view : views.views) view.seen.resize(kept);
+    for (AnchoredViews::View& view : views.views) view.pixels.resize(kept);
   }
 
   /// Standard deviation of the corners that the adjustment's residuals show, within reason: on a sharp image
@@ -259,8 +241,8 @@ class FirstStructureEstimator {
   [[nodiscard]] double cost(const Trial& trial, double sigma_px) const {
     const double finer = (options_.sigma_px / sigma_px) * (options_.sigma_px / sigma_px);
     double sum = static_cast<double>(inliers_.size() - trial.corners.size()) * options_.outlier_chi2;
-    for (std::size_t k = 0; k < trial.views.points.size(); ++k)
-      sum += std::min(finer * worst_chi2(trial.views, k), options_.outlier_chi2);
+    for (const double error : trial.views.worst_errors())
+      sum += std::min(finer * error, options_.outlier_chi2);
     return sum;
   }
 
@@ -270,7 +252,8 @@ class FirstStructureEstimator {
   std::optional<Trial> triangulate(const SE3& T_last_first) const {
     Trial trial{{}, inliers_};
     AnchoredViews& views = trial.views;
-    views.rig = rig_;
+    views.camera = rig_.camera;
+    views.sigma_px = options_.sigma_px;
     std::vector<char> usable;  // of the inliers, in step: its depth is known
     int in_front = 0, behind = 0;
     for (const int i : inliers_) {
@@ -300,12 +283,10 @@ class FirstStructureEstimator {
   }
 
   /// The inliers as a frame saw them.
-  [[nodiscard]] std::vector<SeenPoint> seen(const std::vector<Vector2>& pixels) const {
-    std::vector<SeenPoint> result;
-    for (std::size_t k = 0; k < inliers_.size(); ++k) {
-      const Vector2& uv = pixels[static_cast<std::size_t>(inliers_[k])];
-      result.push_back({static_cast<int>(k), {uv.x(), uv.y(), Rig::kNoRight}});
-    }
+  [[nodiscard]] std::vector<Vector2> seen(const std::vector<Vector2>& pixels) const {
+    std::vector<Vector2> result;
+    result.reserve(inliers_.size());
+    for (const int i : inliers_) result.push_back(pixels[static_cast<std::size_t>(i)]);
     return result;
   }
 

@@ -100,7 +100,10 @@ class GaussNewtonFilter {
     std::vector<SE3> anchors;
     std::vector<Point> points;
   };
-  using Seen = SeenPoint;  ///< by index into points_
+  struct Seen {
+    int point = 0;  ///< index into points_
+    StereoPixel pixel = StereoPixel::Zero();
+  };
 
   [[nodiscard]] int rows() const { return rig_.kind == SensorKind::kMono ? 2 : 3; }
   [[nodiscard]] int anchor_at(int anchor) const { return 6 * (anchor - 1); }
@@ -119,6 +122,7 @@ class GaussNewtonFilter {
   double add_measurements(const std::vector<Seen>& seen, MatrixX* Lambda, VectorX* g) const;
   bool joint_update(const std::vector<Seen>& seen, int iterations);
   void absorb(const std::vector<Seen>& seen);
+  [[nodiscard]] AnchoredViews::View all_seen_from(const SE3& T_c_a, const std::vector<Seen>& seen) const;
   [[nodiscard]] bool start_from(const AnchoredViews& views);
   [[nodiscard]] Mean mean() const { return {T_c_w_, anchors_, points_}; }
   void set_mean(const Mean& mean);

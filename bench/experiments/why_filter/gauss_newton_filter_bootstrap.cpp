@@ -54,21 +54,20 @@ bool GaussNewtonFilter::bootstrap(std::span<const PointObservation> b0, std::spa
   std::copy_if(b0.begin(), b0.end(), std::back_inserter(in_all),
                [&](const PointObservation& o) { return contains(b1, o.point) && contains(first, o.point); });
   add_points(in_all, 0);
-  AnchoredViews views{rig_, {}, {}};
-  views.rig.noise.sigma_px = options_.sigma_px;
+  AnchoredViews views{rig_.camera, options_.sigma_px, {}, {}};
   for (int j = 0; j < point_count(); ++j) {
     const Vector3& psi = points_[static_cast<std::size_t>(j)].psi;
     views.points.push_back({psi, psi, Lambda_.block<3, 3>(point_at(j), point_at(j))});
   }
   // Six unknowns of the motion and three a point, one of them, scale, free.
-  views.views.push_back({SE3(), match(b1)});
-  if (views.views[0].seen.size() < 6 || !views.minimise(options_.two_view_iterations)) return false;
+  views.views.push_back(all_seen_from(SE3(), match(b1)));
+  if (views.points.size() < 6 || !views.minimise(options_.two_view_iterations)) return false;
   if (!views.normalise_scale() || !start_from(views)) return false;
 
   // Third frame: a standard update after the second pose is marginalised; if all goes well, only its start.
   const std::vector<Seen> third = match(first);
   estimate_motion(third);
-  views.views.push_back({T_c_w_, third});
+  views.views.push_back(all_seen_from(T_c_w_, third));
   // Two frames of little parallax leave depths and direction of motion too far off to take derivatives at for
   // good. All three are brought to their common minimum, where the information is taken afresh.
   if (!views.minimise(options_.three_view_iterations) || !views.normalise_scale() || !start_from(views)) {
@@ -77,6 +76,13 @@ bool GaussNewtonFilter::bootstrap(std::span<const PointObservation> b0, std::spa
   }
   reference_ = kCurrentPose;
   return true;
+}
+
+/// A view that saw every point.
+AnchoredViews::View GaussNewtonFilter::all_seen_from(const SE3& T_c_a, const std::vector<Seen>& seen) const {
+  AnchoredViews::View view{T_c_a, std::vector<Vector2>(points_.size())};
+  for (const Seen& s : seen) view.pixels[static_cast<std::size_t>(s.point)] = s.pixel.head<2>();
+  return view;
 }
 
 /// Takes over the views' minimum and information, the second pose, whose distance is the unit of length,
