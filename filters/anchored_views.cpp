@@ -33,7 +33,8 @@ bool AnchoredViews::minimise(int max_iterations, double min_gain) {
   if (!std::isfinite(current)) return false;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     double next = kImpossible;
-    for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
+    int attempt = 0;
+    for (; attempt < kMaxAttempts; ++attempt) {
       batched.linearise(state);
       if (batched.step(damping, state, trial)) next = batched.cost(trial);
       if (next <= current) break;
@@ -43,7 +44,7 @@ bool AnchoredViews::minimise(int max_iterations, double min_gain) {
     std::swap(state, trial);
     const double gain = current - next;
     current = next;
-    damping = std::max(0.1 * damping, 1e-12);
+    if (attempt == 0) damping = std::max(0.1 * damping, 1e-12);  // less of it has only just failed otherwise
     if (gain < min_gain) break;
   }
   batched.write(state, *this);
