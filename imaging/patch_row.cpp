@@ -60,6 +60,8 @@ struct BoxSums {
   }
 };
 
+constexpr int kAtOnce = 8;
+
 /// Correlation of the patch with the image at eight neighbouring positions; `first` is the pixel under the
 /// patch's first entry at the first of them.
 #if defined(__AVX2__)
@@ -147,12 +149,72 @@ struct Correlator {
 
 }  // namespace
 
+namespace {
+
+#if defined(__AVX2__)
+/// For each pair of columns: picks the pixels (c, c+1), (c+1, c+2), ... of a row as 16-bit values.
+struct PairMasks {
+  alignas(32) std::array<std::array<std::int8_t, 32>, kSize / 2> of;
+
+  constexpr PairMasks() : of{} {
+    for (std::size_t pair = 0; pair < of.size(); ++pair) {
+      for (std::size_t i = 0; i < 32; ++i)
+        of[pair][i] = i % 2 == 0 ? static_cast<std::int8_t>(2 * pair + i / 4 + i / 2 % 2) : std::int8_t{-1};
+    }
+  }
+};
+constexpr PairMasks kPairMasks;
+
+/// zero_mean_ssd at eight neighbouring positions, for rows too short for sums of columns to be shared.
+void eight_costs(const Patch& patch, const std::uint8_t* first, std::ptrdiff_t stride, int* cost) {
+  __m256i sums = _mm256_setzero_si256();
+  __m256i squares = _mm256_setzero_si256();
+  const std::int16_t* t = patch.rounded;
+#pragma GCC unroll 8
+  for (int r = 0; r < kSize; ++r, first += stride) {
+    const __m256i row = _mm256_broadcastsi128_si256(_mm_loadu_si128(reinterpret_cast<const __m128i*>(first)));
+    __m256i of_row = _mm256_setzero_si256();  // sums of 4 differences
+#pragma GCC unroll 4
+    for (std::size_t pair = 0; pair < kSize / 2; ++pair, t += 2) {
+      std::int32_t two;
+      std::memcpy(&two, t, sizeof two);
+      const __m256i mask = _mm256_load_si256(reinterpret_cast<const __m256i*>(kPairMasks.of[pair].data()));
+      const __m256i d = _mm256_sub_epi16(_mm256_shuffle_epi8(row, mask), _mm256_set1_epi32(two));
+      of_row = _mm256_add_epi16(of_row, d);
+      squares = _mm256_add_epi32(squares, _mm256_madd_epi16(d, d));
+    }
+    sums = _mm256_add_epi32(sums, _mm256_madd_epi16(of_row, _mm256_set1_epi16(1)));
+  }
+  static_assert(Patch::kArea == 1 << 6);
+  const __m256i of_mean = _mm256_srli_epi32(_mm256_mullo_epi32(sums, sums), 6);
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(cost), _mm256_sub_epi32(squares, of_mean));
+}
+#endif
+
+/// Of fewer positions than columns are summed at once.
+void short_row(const Patch& patch, const cv::Mat& image, int u, int v, std::span<int> cost) {
+  const auto count = static_cast<int>(cost.size());
+#if defined(__AVX2__)
+  if (count >= kAtOnce) {
+    const auto stride = static_cast<std::ptrdiff_t>(image.step);
+    const std::uint8_t* first = image.data + (v - Patch::kCentre) * stride + (u - Patch::kCentre);
+    eight_costs(patch, first, stride, cost.data());
+    const int rest = count - kAtOnce;
+    if (rest > 0) eight_costs(patch, first + rest, stride, cost.data() + rest);  // some of them once more
+    return;
+  }
+#endif
+  for (int i = 0; i < count; ++i) cost[static_cast<std::size_t>(i)] = zero_mean_ssd(patch, image, u + i, v);
+}
+
+}  // namespace
+
 // Sum (q - t)^2 = sum q^2 - 2 sum q t + sum t^2: the first is shared by neighbours, the last by all.
 void zero_mean_ssd_row(const Patch& patch, const cv::Mat& image, int u, int v, std::span<int> cost) {
   const auto count = static_cast<int>(cost.size());
   TWOFOLD_CHECK(count <= kMaxRowCosts, "a longer stretch of a row than there is room for");
   if (count < kTogether) {
-    for (int i = 0; i < count; ++i) cost[static_cast<std::size_t>(i)] = zero_mean_ssd(patch, image, u + i, v);
+    short_row(patch, image, u, v, cost);
     return;
   }
   const auto stride = static_cast<std::ptrdiff_t>(image.step);
@@ -165,7 +227,6 @@ void zero_mean_ssd_row(const Patch& patch, const cv::Mat& image, int u, int v, s
   }
   const BoxSums box(first, stride, count + kSize - 1);
   const Correlator correlate(patch);
-  constexpr int kAtOnce = 8;
   std::array<int, kAtOnce> correlation;
   for (int next = 0; next < count; next += kAtOnce) {
     const int i = std::min(next, count - kAtOnce);  // the last ones overlap those before

@@ -1,8 +1,10 @@
 #include "tracking/monocular/corner_following.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "base/option_check.hpp"
 #include "imaging/guided_search.hpp"
@@ -11,6 +13,9 @@
 
 namespace twofold {
 namespace {
+
+constexpr int kTogether = 8;        // positions of a row, whose costs take as long as those of ...
+constexpr int kFewestTogether = 4;  // ... so many one by one
 
 struct LevelPatch {
   Patch patch;
@@ -34,16 +39,24 @@ std::optional<Eigen::Vector2f> search_square(const Patch& patch, const cv::Mat& 
   constexpr int kMargin = Patch::kCentre;
   int best = std::numeric_limits<int>::max();
   std::optional<Eigen::Vector2f> result;
-  const auto look_at = [&](int u, int v) {
-    const int ssd = zero_mean_ssd(patch, image, u, v);
-    if (ssd >= best) return;
-    best = ssd;
+  const auto take = [&](int u, int v, int cost) {
+    if (cost >= best) return;
+    best = cost;
     result = Eigen::Vector2f(static_cast<float>(u), static_cast<float>(v));
   };
   const int u_end = image.cols - kMargin, v_end = image.rows - kMargin;
-  if (u0 >= kMargin && u0 <= u_end && v0 >= kMargin && v0 <= v_end) look_at(u0, v0);
+  if (u0 >= kMargin && u0 <= u_end && v0 >= kMargin && v0 <= v_end)
+    take(u0, v0, zero_mean_ssd(patch, image, u0, v0));
+  const int last = std::min(u0 + radius, u_end);
+  std::array<int, kTogether> ssd;
   for (int v = std::max(v0 - radius, kMargin); v <= std::min(v0 + radius, v_end); ++v) {
-    for (int u = std::max(u0 - radius, kMargin); u <= std::min(u0 + radius, u_end); ++u) look_at(u, v);
+    for (int u = std::max(u0 - radius, kMargin); u <= last; u += kTogether) {
+      const int wanted = std::min(last - u + 1, kTogether);
+      const bool together = wanted >= kFewestTogether && u + kTogether <= u_end;  // a pixel more is read
+      const int looked_at = together ? kTogether : wanted;
+      zero_mean_ssd_row(patch, image, u, v, std::span(ssd).first(static_cast<std::size_t>(looked_at)));
+      for (int i = 0; i < wanted; ++i) take(u + i, v, ssd[static_cast<std::size_t>(i)]);
+    }
   }
   return result;
 }
