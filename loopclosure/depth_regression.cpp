@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace twofold {
 namespace {
@@ -13,16 +14,39 @@ constexpr double kSamePlace = 1.0;  // [px] as exactly as corners are found: dis
 
 }  // namespace
 
+DepthRegression::DepthRegression(const PinholeCamera& camera, const DepthRegressionOptions& options)
+    : camera_(camera),
+      options_(options),
+      reach_(options.max_distance_share * camera.width),
+      cell_(std::max(reach_, kSamePlace)),
+      cells_(Eigen::Array2i(static_cast<int>(camera.width / cell_), static_cast<int>(camera.height / cell_)) +
+             1) {}
+
+/// Those beside the image are of the nearest cell.
+Eigen::Array2i DepthRegression::cell_of(const Eigen::Array2d& uv) const {
+  const Eigen::Array2d last = (cells_ - 1).cast<double>();
+  return (uv / cell_).max(0).min(last).cast<int>();
+}
+
 void DepthRegression::learn(const GraphSnapshot& graph, KeyframeId k) {
-  samples_.clear();
+  unsorted_.clear();
   const Keyframe& keyframe = graph.keyframe(k);
   for (const Observation& observation : *keyframe.observations) {
     // Where it should be, not where it was measured: a map may have been made with another camera.
     const Vector3 x_k = keyframe.T_k_w * graph.position(observation.point);
-    if (in_front_of_camera(x_k)) samples_.push_back({camera_.project(x_k), 1 / x_k.z()});
+    if (in_front_of_camera(x_k)) unsorted_.push_back({camera_.project(x_k), 1 / x_k.z()});
   }
-  std::stable_sort(samples_.begin(), samples_.end(),
-                   [](const Sample& a, const Sample& b) { return a.uv.y() < b.uv.y(); });
+  const auto index_of = [&](const Sample& sample) {
+    const Eigen::Array2i cell = cell_of(sample.uv.array());
+    return static_cast<std::size_t>(cell.y() * cells_.x() + cell.x());
+  };
+  begin_.assign(static_cast<std::size_t>(cells_.prod()) + 1, 0);
+  for (const Sample& sample : unsorted_) ++begin_[index_of(sample) + 1];
+  std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
+  samples_.resize(unsorted_.size());
+  std::vector<int> next(begin_.begin(), begin_.end() - 1);
+  for (const Sample& sample : unsorted_)
+    samples_[static_cast<std::size_t>(next[index_of(sample)]++)] = sample;
 }
 
 std::optional<double> DepthRegression::depth_at(const Vector2& uv) const {
@@ -31,21 +55,23 @@ std::optional<double> DepthRegression::depth_at(const Vector2& uv) const {
     double inverse_depth = 0;
   };
   std::array<Neighbour, kNeighbours> nearest;
-  const double reach = options_.max_distance_share * camera_.width;
-  const auto above = [](const Sample& sample, double v) { return sample.uv.y() < v; };
-  for (auto sample = std::lower_bound(samples_.begin(), samples_.end(), uv.y() - reach, above);
-       sample != samples_.end() && sample->uv.y() <= uv.y() + reach; ++sample) {
-    if (std::abs(sample->uv.x() - uv.x()) > reach) continue;
-    const double distance = (sample->uv - uv).norm();
-    if (distance >= nearest.back().distance) continue;
-    nearest.back() = {distance, sample->inverse_depth};
-    for (std::size_t n = kNeighbours - 1; n > 0 && nearest[n].distance < nearest[n - 1].distance; --n)
-      std::swap(nearest[n], nearest[n - 1]);
+  const Eigen::Array2i first = cell_of(uv.array() - reach_), last = cell_of(uv.array() + reach_);
+  for (int row = first.y(); row <= last.y(); ++row) {
+    const auto in_row = static_cast<std::size_t>(row * cells_.x());
+    const int end = begin_[in_row + static_cast<std::size_t>(last.x()) + 1];
+    for (int s = begin_[in_row + static_cast<std::size_t>(first.x())]; s < end; ++s) {
+      const Sample& sample = samples_[static_cast<std::size_t>(s)];
+      const double distance = (sample.uv - uv).norm();
+      if (distance >= nearest.back().distance) continue;
+      nearest.back() = {distance, sample.inverse_depth};
+      for (std::size_t n = kNeighbours - 1; n > 0 && nearest[n].distance < nearest[n - 1].distance; --n)
+        std::swap(nearest[n], nearest[n - 1]);
+    }
   }
   double sum = 0, weights = 0;
   double least = std::numeric_limits<double>::infinity(), most = 0;
   for (const Neighbour& neighbour : nearest) {
-    if (neighbour.distance > reach) break;
+    if (neighbour.distance > reach_) break;
     const double distance = std::max(neighbour.distance, kSamePlace);
     const double weight = 1 / (distance * distance);
     sum += weight * neighbour.inverse_depth;

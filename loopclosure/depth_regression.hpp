@@ -26,8 +26,7 @@ struct DepthRegressionOptions {
 /// the mean says nothing. As the map is now: a corner's depth follows every change of the map's unit.
 class DepthRegression {
  public:
-  explicit DepthRegression(const PinholeCamera& camera, const DepthRegressionOptions& options = {})
-      : camera_(camera), options_(options) {}
+  explicit DepthRegression(const PinholeCamera& camera, const DepthRegressionOptions& options = {});
 
   /// Forgets what it knew, and learns the points that keyframe k, which must not be culled, observes.
   void learn(const GraphSnapshot& graph, KeyframeId k);
@@ -46,9 +45,16 @@ class DepthRegression {
     double inverse_depth;
   };
 
+  [[nodiscard]] Eigen::Array2i cell_of(const Eigen::Array2d& uv) const;
+
   PinholeCamera camera_;
   DepthRegressionOptions options_;
-  std::vector<Sample> samples_;  ///< from top to bottom
+  double reach_;                 ///< how far a point may be [px]
+  double cell_;                  ///< side of a cell [px]: a search meets nine at most
+  Eigen::Array2i cells_;         ///< columns and rows of the image
+  std::vector<Sample> samples_;  ///< by cell, row by row
+  std::vector<int> begin_;       ///< of each cell's samples, and the end of the last
+  std::vector<Sample> unsorted_;
 };
 
 }  // namespace twofold

@@ -109,15 +109,25 @@ constexpr std::array kGuidedRadii{1.0, 0.5, 0.5};
 std::optional<VerifiedPlace> verify_place(const Rig& rig, std::span<const PlacedView> place,
                                           const PlaceAppearance& b, const VerificationOptions& options,
                                           VerificationReport* report) {
+  if (place.empty()) return std::nullopt;
+  return verify_place(
+      rig, *place[0].appearance, [&] { return place; }, b, options, report);
+}
+
+std::optional<VerifiedPlace> verify_place(const Rig& rig, const PlaceAppearance& a,
+                                          const std::function<std::span<const PlacedView>()>& place_of_a,
+                                          const PlaceAppearance& b, const VerificationOptions& options,
+                                          VerificationReport* report) {
   VerificationReport unwanted;
   VerificationReport& r = report != nullptr ? *report : unwanted;
   r = {};
+  if (!has_positions(a) || !has_positions(b)) return std::nullopt;
+  const auto hypothesis = find_pose_hypothesis(rig, a, b, options, r);
+  if (!hypothesis) return std::nullopt;
+  const std::span<const PlacedView> place = place_of_a();
   for (const PlacedView& view : place) {
     if (!has_positions(*view.appearance)) return std::nullopt;
   }
-  if (place.empty() || !has_positions(b)) return std::nullopt;
-  const auto hypothesis = find_pose_hypothesis(rig, *place[0].appearance, b, options, r);
-  if (!hypothesis) return std::nullopt;
 
   SE3 T_b_a = *hypothesis;
   const std::vector<PlacePoint> points = points_of(rig, place, options);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -73,7 +74,14 @@ struct VerificationReport {
 /// When nothing is known of b's depths, five points propose, and the place's depths give the length of the
 /// way.
 ///
-/// @param place  the place's own view a first, with T_v_a = identity; then, if there are, its neighbours'
+/// @param a      the place's own view
+/// @param place  asked for once a and b have proposed a pose, which most wrong places do not come to: a
+///               again, with T_v_a = identity; then, if there are, its neighbours'
+[[nodiscard]] std::optional<VerifiedPlace> verify_place(
+    const Rig& rig, const PlaceAppearance& a, const std::function<std::span<const PlacedView>()>& place,
+    const PlaceAppearance& b, const VerificationOptions& options, VerificationReport* report = nullptr);
+
+/// The same, with all views at hand, the place's own first; none if there are no views.
 [[nodiscard]] std::optional<VerifiedPlace> verify_place(const Rig& rig, std::span<const PlacedView> place,
                                                         const PlaceAppearance& b,
                                                         const VerificationOptions& options,

@@ -1,5 +1,6 @@
 #include "loopclosure/loop_closer.hpp"
 
+#include <algorithm>
 #include <span>
 #include <stdexcept>
 #include <utility>
@@ -100,6 +101,7 @@ std::optional<Relocalisation> LoopCloser::relocalise(const FrameImages& images, 
 std::optional<Relocalisation> LoopCloser::first_place(const std::vector<PlaceCandidate>& candidates,
                                                       const DescribedPlace& view, const FrameImages& images,
                                                       const GraphSnapshot& graph) {
+  views_with_depth_.clear();
   for (const PlaceCandidate& candidate : candidates) {
     auto verified = verify(candidate.keyframe, view, images, graph);
     if (verified && scale_of(*verified)) return verified;
@@ -112,6 +114,7 @@ std::optional<Relocalisation> LoopCloser::first_place(const std::vector<PlaceCan
 std::optional<Relocalisation> LoopCloser::only_place(const std::vector<PlaceCandidate>& candidates,
                                                      const DescribedPlace& view, const FrameImages& images,
                                                      const GraphSnapshot& graph) {
+  views_with_depth_.clear();
   std::optional<Relocalisation> likeliest;
   for (const PlaceCandidate& candidate : candidates) {
     const auto verified = verify(candidate.keyframe, view, images, graph);
@@ -129,8 +132,10 @@ std::optional<Relocalisation> LoopCloser::only_place(const std::vector<PlaceCand
 std::optional<Relocalisation> LoopCloser::verify(KeyframeId k, const DescribedPlace& view,
                                                  const FrameImages& images, const GraphSnapshot& graph) {
   if (!graph.contains(k)) return std::nullopt;
-  collect_views(k, graph);
-  const auto place = verify_place(rig_, views_, view, options_.verification);
+  const PlaceAppearance* own = view_of(k, graph);
+  if (own == nullptr) return std::nullopt;
+  const auto place = verify_place(
+      rig_, *own, [&] { return views_of_place(k, graph); }, view, options_.verification);
   if (!place) return std::nullopt;
   RefinedPlace refined;
   switch (refinement_.refine(graph, k, images, place->T_b_a, refined)) {
@@ -159,24 +164,31 @@ std::optional<double> LoopCloser::scale_of(const Relocalisation& seen) const {
   return median(std::span(ratios));
 }
 
+/// What is remembered of a keyframe, with depths; null if nothing is.
+const PlaceAppearance* LoopCloser::view_of(KeyframeId k, const GraphSnapshot& graph) {
+  const PlaceAppearance* view = places_.find(k);
+  if (view == nullptr || rig_.kind != SensorKind::kMono) return view;
+  const auto known = std::find_if(views_with_depth_.begin(), views_with_depth_.end(),
+                                  [&](const ViewWithDepth& other) { return other.keyframe == k; });
+  if (known != views_with_depth_.end()) return &known->view;
+  place_depths_.learn(graph, k);
+  PlaceAppearance& with_depth = views_with_depth_.emplace_back(ViewWithDepth{k, *view}).view;
+  place_depths_.fill(with_depth, rig_.baseline);
+  return &with_depth;
+}
+
 /// The place's own view and those of its neighbours.
-void LoopCloser::collect_views(KeyframeId k, const GraphSnapshot& graph) {
+std::span<const PlacedView> LoopCloser::views_of_place(KeyframeId k, const GraphSnapshot& graph) {
   neighbours_.clear();
   direct_neighbours(graph, k, static_cast<std::size_t>(options_.place_views), neighbours_);
   views_.clear();
-  views_with_depth_.clear();
-  views_with_depth_.reserve(neighbours_.size());
   for (const KeyframeId n : neighbours_) {
-    const PlaceAppearance* view = places_.find(n);
+    const PlaceAppearance* view = view_of(n, graph);
     if (view == nullptr) continue;
-    if (rig_.kind == SensorKind::kMono) {
-      place_depths_.learn(graph, n);
-      place_depths_.fill(views_with_depth_.emplace_back(*view), rig_.baseline);
-      view = &views_with_depth_.back();
-    }
     const SE3 T_n_k = n == k ? SE3() : relative_pose(graph, k, *find_edge(graph.keyframe(k), n));
     views_.push_back({view, T_n_k});
   }
+  return views_;
 }
 
 void LoopCloser::remember(KeyframeId id, DescribedPlace view) {

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "graph/keyframe_database.hpp"
@@ -85,7 +87,8 @@ class LoopCloser {
                                                          const GraphSnapshot& graph);
   [[nodiscard]] std::vector<PlaceCandidate> in_older_parts(KeyframeId id, const BagOfWords& bag,
                                                            const GraphSnapshot& graph);
-  void collect_views(KeyframeId k, const GraphSnapshot& graph);
+  [[nodiscard]] const PlaceAppearance* view_of(KeyframeId k, const GraphSnapshot& graph);
+  [[nodiscard]] std::span<const PlacedView> views_of_place(KeyframeId k, const GraphSnapshot& graph);
   [[nodiscard]] std::optional<double> scale_of(const Relocalisation& seen) const;
   void remember(KeyframeId id, DescribedPlace view);
 
@@ -101,11 +104,15 @@ class LoopCloser {
   std::uint32_t oldest_ = 0;  ///< keyframe: all before it are culled
   std::vector<KeyframeId> neighbours_;
   std::vector<PlacedView> views_;
-  // One camera only: depths of the keyframe at hand, and the places' views with those that the map gives
-  // them.
+  // One camera only: depths of the keyframe at hand, and the views of keyframes with those that the map gives
+  // them. Candidates are neighbours of each other: a view is made once for all of those of one question.
+  struct ViewWithDepth {
+    KeyframeId keyframe;
+    PlaceAppearance view;
+  };
   DepthRegression depths_, place_depths_;
-  std::vector<PlaceAppearance> views_with_depth_;
-  std::optional<BagOfWords> previous_;  // of the keyframe described last
+  std::deque<ViewWithDepth> views_with_depth_;  // views_ points to them
+  std::optional<BagOfWords> previous_;          // of the keyframe described last
 };
 
 }  // namespace twofold

@@ -56,19 +56,25 @@ AgreementGraph SimilarityEstimator::agreements() const {
 }
 
 void SimilarityEstimator::fit(std::span<const int, 3> sample, std::vector<Model>& models) const {
+  const auto pair_of = [&](std::size_t k) -> const Pair& {
+    return pairs_[static_cast<std::size_t>(sample[k % 3])];
+  };
+  // Most samples fail, and most of them here already.
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (!turn_alike(pair_of(k), pair_of(k + 1))) return;
+  }
   const bool scale_known = rig_.kind != SensorKind::kMono;
   std::array<Vector3, 3> x_a, x_b;
   double scale = 1;  // of the first side, squared
   for (std::size_t k = 0; k < 3; ++k) {
-    const Pair& pair = pairs_[static_cast<std::size_t>(sample[k])];
-    const Pair& next = pairs_[static_cast<std::size_t>(sample[(k + 1) % 3])];
+    const Pair &pair = pair_of(k), &next = pair_of(k + 1);
     x_a[k] = pair.x_a;
     x_b[k] = pair.x_b;
     const double in_b = (pair.x_b - next.x_b).squaredNorm();
     double in_a = (pair.x_a - next.x_a).squaredNorm();
     if (!scale_known && k == 0) scale = in_b / in_a;
     in_a *= scale;
-    if (!as_long(in_a, in_b) || !turn_alike(pair, next)) return;
+    if (!as_long(in_a, in_b)) return;
   }
   if (scale_known) {
     if (const auto T_b_a = align_rigid(x_b, x_a)) models.emplace_back(Sim3(*T_b_a));

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <random>
+#include <utility>
 #include <vector>
 
 #include "geometry/inverse_depth.hpp"
@@ -123,6 +126,38 @@ TEST_F(DepthRegressionTest, DepthsAreWrittenAsASecondCameraWouldMeasureThem) {
   EXPECT_NEAR(view.pixels[0].z(), 300 - 400 * 0.5 / 4, 1e-4);
   EXPECT_EQ(view.pixels[0].head<2>(), view.corners[0].uv);
   EXPECT_TRUE(std::isnan(view.pixels[1].z()));
+}
+
+/// Wherever the points are, some of them beside the image: its cells hide none that is within reach.
+TEST_F(DepthRegressionTest, TheNearestPointsCountWhicheverCellTheyAreIn) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> u(-20, 660), v(-20, 500), depth(4, 4.5);
+  std::vector<std::pair<Vector2, double>> points;
+  for (int n = 0; n < 300; ++n) {
+    points.emplace_back(Vector2(u(random), v(random)), depth(random));
+    add_point(points.back().first, points.back().second);
+  }
+  regression_.learn(writer_.graph(), kSeenFrom);
+  int known = 0;
+  for (int n = 0; n < 500; ++n) {
+    const Vector2 uv(std::clamp(u(random), 0.0, 639.0), std::clamp(v(random), 0.0, 479.0));
+    std::sort(points.begin(), points.end(),
+              [&](const auto& a, const auto& b) { return (a.first - uv).norm() < (b.first - uv).norm(); });
+    double sum = 0, weights = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double distance = (points[k].first - uv).norm();
+      if (distance > 0.04 * camera_.width) break;
+      const double weight = 1 / std::max(1.0, distance * distance);
+      sum += weight / points[k].second;
+      weights += weight;
+    }
+    const auto found = regression_.depth_at(uv);
+    ASSERT_EQ(found.has_value(), sum > 0) << uv.transpose();
+    if (!found) continue;
+    EXPECT_NEAR(*found, weights / sum, 1e-6) << uv.transpose();
+    ++known;
+  }
+  EXPECT_GT(known, 300);
 }
 
 }  // namespace

@@ -305,6 +305,19 @@ TEST_P(MatchRuleTest, AViewWhoseCornersHaveNoPositionsIsNoPlace) {
   EXPECT_FALSE(verify_place(rig_, {}, b_, {}));
 }
 
+TEST_P(MatchRuleTest, OnlyAPlaceThatMayBeTheRightOneIsAskedForItsNeighbours) {
+  int asked = 0;
+  const PlacedView own{&a_, SE3()};
+  const auto place = [&] {
+    ++asked;
+    return std::span(&own, 1);
+  };
+  EXPECT_FALSE(verify_place(rig_, a_, place, view(2, SE3()), {}));
+  EXPECT_EQ(asked, 0);
+  EXPECT_TRUE(verify_place(rig_, a_, place, b_, {}));
+  EXPECT_EQ(asked, 1);
+}
+
 /// A lost camera that knows no depths: five directions agree with a pose of their own whatever they are, so
 /// that a sixth must speak for it.
 TEST_P(MatchRuleTest, FiveDirectionsAloneAreNoHypothesis) {
