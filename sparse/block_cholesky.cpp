@@ -3,6 +3,7 @@
 #include <Eigen/OrderingMethods>
 #include <Eigen/SparseCore>
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "base/check.hpp"
@@ -79,6 +80,12 @@ void BlockCholesky::find_fill() {
   resize_exactly(blocks_, row_.size());
   inverse_diagonal_.resize(n);
   place_.assign(n, -1);
+  continues_.assign(n, 0);
+  for (int j = 0; j + 1 < n; ++j) {
+    const int height = column_begin_[j + 1] - column_begin_[j];
+    continues_[j] = height > 1 && row_[column_begin_[j] + 1] == j + 1 &&
+                    column_begin_[j + 2] - column_begin_[j + 1] == height - 1;
+  }
 }
 
 int BlockCholesky::block_index(int row, int column) const {
@@ -102,19 +109,27 @@ void BlockCholesky::set_zero() {
   set_all_zero(blocks_.data(), blocks_.size());
 }
 
-/// Left-looking: column k takes what all finished columns with a block in row k owe to it.
+/// Left-looking: column k takes what all finished columns with a block in row k owe to it; of columns that go
+/// on in the same rows up to four at once, while the block that takes it waits in registers.
 bool BlockCholesky::factorise() {
   const int n = size();
   for (int k = 0; k < n; ++k) {
     const int begin = column_begin_[k];
     const int end = column_begin_[k + 1];
     for (int b = begin; b < end; ++b) place_[row_[b]] = b;
-    for (int e = row_begin_[k]; e < row_begin_[k + 1]; ++e) {
-      const auto [j, first] = row_entries_[e];
-      const double* L_kj = blocks_[first].data();
-      for (int b = first; b < column_begin_[j + 1]; ++b) {
-        add_outer_product<-1, 6>(blocks_[place_[row_[b]]].data(), blocks_[b].data(), L_kj);
+    const auto row = std::span<const RowEntry>(row_entries_)
+                         .subspan(row_begin_[k], static_cast<std::size_t>(row_begin_[k + 1] - row_begin_[k]));
+    for (std::size_t e = 0; e < row.size();) {
+      std::size_t count = 1;
+      while (count < 4 && e + count < row.size() && continues_[row[e + count - 1].column]) ++count;
+      if (count == 4) {
+        subtract_products<4>(row.subspan(e, 4));
+      } else if (count >= 2) {
+        subtract_products<2>(row.subspan(e, count = 2));
+      } else {
+        subtract_products<1>(row.subspan(e, 1));
       }
+      e += count;
     }
     if (!factorise_diagonal<6>(blocks_[begin], inverse_diagonal_[k])) return false;
     for (int b = begin + 1; b < end; ++b) {
@@ -124,6 +139,26 @@ bool BlockCholesky::factorise() {
     }
   }
   return true;
+}
+
+/// From the column whose rows are in place_, what these columns owe to it, which have the same rows from
+/// there on.
+template <std::size_t kColumns>
+void BlockCholesky::subtract_products(std::span<const RowEntry> columns) {
+  std::array<const Matrix6*, kColumns> L_i, L_k;
+  for (std::size_t c = 0; c < kColumns; ++c) L_i[c] = L_k[c] = &blocks_[columns[c].block];
+  const auto [j, first] = columns[0];
+  for (int b = first; b < column_begin_[j + 1]; ++b) {
+    Packet4 acc[9];
+    double* target = blocks_[place_[row_[b]]].data();
+    load_block(acc, target);
+#pragma GCC unroll 4
+    for (std::size_t c = 0; c < kColumns; ++c) {
+      accumulate_outer_products<-1, 6>(acc, L_i[c]->data(), L_k[c]->data());
+      ++L_i[c];
+    }
+    store_block(acc, target);
+  }
 }
 
 void BlockCholesky::solve(std::span<Vector6> rhs) const {

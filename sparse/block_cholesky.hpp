@@ -47,6 +47,8 @@ class BlockCholesky {
 
   void choose_order();
   void find_fill();
+  template <std::size_t kColumns>
+  void subtract_products(std::span<const RowEntry> columns);
   /// The two halves of solve, with L L^T = A: x becomes L^-1 x, or L^-T x.
   void solve_lower(std::span<Vector6> rhs) const;
   void solve_upper(std::span<Vector6> rhs) const;
@@ -62,6 +64,7 @@ class BlockCholesky {
   std::vector<RowEntry> row_entries_;
   std::vector<Matrix6> blocks_;
   std::vector<Matrix6> inverse_diagonal_;  // L_jj^-1, lower triangular
+  std::vector<char> continues_;            // whether column j + 1 has all rows that column j has below it
   std::vector<int> place_;                 // scratch: block of a row in the column looked at last
 };
 

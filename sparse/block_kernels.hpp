@@ -57,6 +57,22 @@ template <int kSign>
   }
 }
 
+/// All of a 6x6 block, column-major and dense, in the nine registers, and back.
+inline void load_block(Packet4 (&acc)[9], const double* a) {
+#pragma GCC unroll 9
+  for (int n = 0; n < 9; ++n) acc[n] = load4(a + 4 * n);
+}
+inline void store_block(const Packet4 (&acc)[9], double* a) {
+#pragma GCC unroll 9
+  for (int n = 0; n < 9; ++n) store4(a + 4 * n, acc[n]);
+}
+template <int kSign, int K>
+[[gnu::always_inline]] inline void accumulate_outer_products(Packet4 (&acc)[9], const double* b,
+                                                             const double* c) {
+#pragma GCC unroll 6
+  for (int k = 0; k < K; ++k) accumulate_outer_product<kSign>(acc, b + 6 * k, c + 6 * k);
+}
+
 /// A += sign * B C^T with A 6x6, B and C 6xK, all column-major and dense.
 ///
 /// No __restrict, as C is all read before A is written: with it, a loop over B and A has the numbers of C
@@ -64,12 +80,9 @@ template <int kSign>
 template <int kSign, int K>
 inline void add_outer_product(double* a, const double* b, const double* c) {
   Packet4 acc[9];
-#pragma GCC unroll 9
-  for (int n = 0; n < 9; ++n) acc[n] = load4(a + 4 * n);
-#pragma GCC unroll 6
-  for (int k = 0; k < K; ++k) accumulate_outer_product<kSign>(acc, b + 6 * k, c + 6 * k);
-#pragma GCC unroll 9
-  for (int n = 0; n < 9; ++n) store4(a + 4 * n, acc[n]);
+  load_block(acc, a);
+  accumulate_outer_products<kSign, K>(acc, b, c);
+  store_block(acc, a);
 }
 
 /// How many numbers behind the last strip subtract_strip_product may read (and not use).
@@ -83,14 +96,9 @@ template <int N>
 inline void subtract_strip_product(double* a, const double* b, const double* c, int K) {
   if constexpr (N == 6) {
     Packet4 acc[9];
-#pragma GCC unroll 9
-    for (int n = 0; n < 9; ++n) acc[n] = load4(a + 4 * n);
-    for (int k = 0; k < K; k += 2) {
-#pragma GCC unroll 2
-      for (int u = 0; u < 2; ++u) accumulate_outer_product<-1>(acc, b + 6 * (k + u), c + 6 * (k + u));
-    }
-#pragma GCC unroll 9
-    for (int n = 0; n < 9; ++n) store4(a + 4 * n, acc[n]);
+    load_block(acc, a);
+    for (int k = 0; k < K; k += 2) accumulate_outer_products<-1, 2>(acc, b + 6 * k, c + 6 * k);
+    store_block(acc, a);
   } else {
     constexpr int kPackets = (N + 3) / 4;
     constexpr int kChains = N <= 3 ? 2 : 1;  // a single short one would wait for its own sums
