@@ -10,12 +10,14 @@
 
 namespace twofold {
 
-double observation_chi2(const WindowProblem& problem, const WindowProblem::Point& point,
+Vector3 position_w(const WindowProblem& problem, const WindowProblem::Point& point) {
+  if (!(point.psi.z() > 0)) return Vector3::Constant(std::numeric_limits<double>::quiet_NaN());
+  return problem.poses[point.anchor].T_k_w.inverse() * from_inverse_depth(point.psi);
+}
+
+double observation_chi2(const WindowProblem& problem, const Vector3& position_w,
                         const WindowProblem::Observation& observation) {
-  if (!(point.psi.z() > 0)) return std::numeric_limits<double>::infinity();
-  const SE3& T_i_w = problem.poses[observation.pose].T_k_w;
-  const SE3& T_a_w = problem.poses[point.anchor].T_k_w;
-  const Vector3 x = T_i_w * (T_a_w.inverse() * from_inverse_depth(point.psi));
+  const Vector3 x = problem.poses[observation.pose].T_k_w * position_w;
   return ObservationModel(problem.rig).chi2(x, observation.pixel, observation.information);
 }
 
@@ -23,8 +25,9 @@ double window_cost(const WindowProblem& problem, const WindowSolverOptions& opti
   const HuberKernel kernel{options.huber_sigmas};
   double cost = 0;
   for (const auto& point : problem.points) {
+    const Vector3 x_w = position_w(problem, point);
     for (int n = 0; n < point.observation_count; ++n) {
-      const double chi2 = observation_chi2(problem, point, problem.observations[point.first_observation + n]);
+      const double chi2 = observation_chi2(problem, x_w, problem.observations[point.first_observation + n]);
       if (std::isfinite(chi2)) cost += kernel.rho(chi2);
     }
   }

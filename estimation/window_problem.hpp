@@ -71,8 +71,11 @@ struct SolverSummary {
   Termination termination = Termination::kEmptyProblem;
 };
 
-/// Whitened squared error of one observation at the problem's present values; infinity behind the camera.
-[[nodiscard]] double observation_chi2(const WindowProblem& problem, const WindowProblem::Point& point,
+/// Where a point is in the world at the problem's present values [m]; NaN without a positive inverse depth.
+[[nodiscard]] Vector3 position_w(const WindowProblem& problem, const WindowProblem::Point& point);
+
+/// Whitened squared error of one observation of a point; infinity behind the camera, or for a NaN.
+[[nodiscard]] double observation_chi2(const WindowProblem& problem, const Vector3& position_w,
                                       const WindowProblem::Observation& observation);
 
 /// Robustified chi2 of the whole problem (eq. 6.4); observations behind their camera are left out, as the

@@ -205,11 +205,12 @@ void WindowBuilder::find_outliers(const DoubleWindow& window, std::vector<Outlie
   outliers.clear();
   for (std::size_t p = 0; p < point_ids_.size(); ++p) {
     const auto& point = problem_.points[p];
+    const Vector3 x_w = position_w(problem_, point);
     for (int n = 0; n < point.observation_count; ++n) {
       const auto& observation = problem_.observations[static_cast<std::size_t>(point.first_observation + n)];
       const double limit =
           weighs_right(observation.information) ? options_.outlier_chi2_stereo : options_.outlier_chi2_mono;
-      if (observation_chi2(problem_, point, observation) <= limit) continue;
+      if (observation_chi2(problem_, x_w, observation) <= limit) continue;
       outliers.push_back({window.nodes[static_cast<std::size_t>(observation.pose)].id, point_ids_[p]});
     }
   }

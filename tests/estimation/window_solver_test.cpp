@@ -154,7 +154,8 @@ TEST(WindowSolver, LeavesOutObservationsBehindTheCamera) {
   problem.observations.push_back({static_cast<int>(problem.poses.size()) - 1, {300, 200, 290}, {1, 1, 1}});
   point.observation_count = 2;
   problem.points.push_back(point);
-  ASSERT_FALSE(std::isfinite(observation_chi2(problem, point, problem.observations.back())));
+  ASSERT_FALSE(
+      std::isfinite(observation_chi2(problem, position_w(problem, point), problem.observations.back())));
   const SE3 lonely = problem.poses.back().T_k_w;
   WindowSolver solver;
   const auto summary = solver.solve(problem, to_convergence());

@@ -9,8 +9,8 @@ namespace {
 double point_cost(const WindowProblem& problem, const WindowProblem::Point& point, double huber) {
   double sum = 0;
   for (int n = 0; n < point.observation_count; ++n) {
-    sum += HuberKernel{huber}.rho(
-        observation_chi2(problem, point, problem.observations[point.first_observation + n]));
+    sum += HuberKernel{huber}.rho(observation_chi2(problem, position_w(problem, point),
+                                                   problem.observations[point.first_observation + n]));
   }
   return sum;
 }

@@ -62,7 +62,7 @@ TEST_F(WindowBuilderTest, TakesPointsOfTheInnerWindowWithAllTheirMeasurementsInB
     for (int n = 0; n < point.observation_count; ++n) {
       const auto& o = builder.problem().observations[static_cast<std::size_t>(point.first_observation + n)];
       seen_from.insert(window_.nodes[static_cast<std::size_t>(o.pose)].id);
-      EXPECT_LT(observation_chi2(builder.problem(), point, o), 1e-6);
+      EXPECT_LT(observation_chi2(builder.problem(), position_w(builder.problem(), point), o), 1e-6);
     }
     const std::set<KeyframeId> expected =
         id == inner ? std::set{k(7), k(8), k(9)} : std::set{k(4), k(6), k(7)};
@@ -128,9 +128,8 @@ TEST_F(WindowBuilderTest, PointsWhoseAnchorWasCulledAreOptimisedAndGoBackIntoThe
   WindowBuilder builder = build();
   ASSERT_EQ(builder.point_ids(), std::vector{id});
   EXPECT_EQ(window_.nodes[static_cast<std::size_t>(builder.problem().points[0].anchor)].id, k(9));
-  EXPECT_LT(
-      observation_chi2(builder.problem(), builder.problem().points[0], builder.problem().observations[0]),
-      1e-6);
+  const WindowProblem& problem = builder.problem();
+  EXPECT_LT(observation_chi2(problem, position_w(problem, problem.points[0]), problem.observations[0]), 1e-6);
   for (auto& pose : builder.problem().poses) pose.T_k_w = pose.T_k_w * SE3(SO3(), {3, 2, 1});
   builder.write_back(writer_, window_);
   EXPECT_EQ(writer_.graph().point(id).anchor, k(7));
