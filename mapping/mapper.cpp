@@ -34,11 +34,18 @@ MapperOptions validated(const MapperOptions& options) {
   return options;
 }
 
+MapperOptions for_camera(const Rig& rig, MapperOptions options) {
+  if (rig.kind == SensorKind::kMono)
+    options.solver.relative_decrease =
+        std::max(options.solver.relative_decrease, options.one_camera_decrease);
+  return options;
+}
+
 }  // namespace
 
 Mapper::Mapper(const Rig& rig, const MapperOptions& options, PointSearch search)
     : rig_(rig),
-      options_(validated(options)),
+      options_(for_camera(rig, validated(options))),
       builder_(rig, options),
       metric_loops_(rig, options, std::move(search)),
       point_culler_(rig, options.culling) {}

@@ -52,6 +52,7 @@ std::string GlobalAdjustmentOptions::invalid_reason() const {
 std::string MapperOptions::invalid_reason() const {
   return OptionCheck()
       .at_least("inner_window", inner_window, 1)
+      .at_least("one_camera_decrease", one_camera_decrease, 0)
       .at_least("outer_window", outer_window, 0)
       .at_least("max_anchors", max_anchors, 0)
       .at_least("max_points", max_points, 1)

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <climits>
+#include <cmath>
 #include <cstring>
 
 #include "fixtures/graph_invariants.hpp"
@@ -106,6 +107,30 @@ TEST(Mapper, IsLocallyAsAccurateAsFullBundleAdjustment) {
   }
   RecordProperty("dwo_over_ba", std::to_string(std::sqrt(dwo / ba)));
   EXPECT_LT(std::sqrt(dwo / ba), 1.05);
+}
+
+/// What a round leaves to gain is less than anybody sees, and the next round knows: it takes one step. The
+/// camera is as exact as with all steps.
+TEST(Mapper, EndsARoundWhenAStepGainsLessThanNoise) {
+  double squared_error = 0, squared_error_of_all_steps = 0;
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    for (double* sum : {&squared_error, &squared_error_of_all_steps}) {
+      Simulation simulation = spiral(60, seed, 0, SensorKind::kMono);
+      MapperOptions options = small_windows();
+      if (sum == &squared_error_of_all_steps) options.one_camera_decrease = 0;
+      Mapper mapper(simulation::thesis_rig(SensorKind::kMono), options);
+      int rounds = 0, ended_early = 0;
+      while (!simulation.done()) {
+        map_next(simulation, mapper);
+        ended_early += mapper.step({}).solver.iterations == 1;
+        if (++rounds >= 30) *sum += std::pow(inner_error(mapper, simulation), 2);
+      }
+      if (sum == &squared_error) {
+        EXPECT_GT(ended_early, rounds / 2) << seed;
+      }
+    }
+  }
+  EXPECT_NEAR(std::sqrt(squared_error / squared_error_of_all_steps), 1, 0.02);
 }
 
 TEST(Mapper, SameInputGivesTheSameGraphBitForBit) {
