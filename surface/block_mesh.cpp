@@ -50,8 +50,9 @@ VertexPlace place_of(int s, int last, const CubeEdge& edge) {
 
 }  // namespace
 
-BlockMesher::BlockMesher(const SurfaceVolume& volume)
+BlockMesher::BlockMesher(const SurfaceVolume& volume, std::span<const Pending> pending)
     : volume_(volume),
+      pending_(pending),
       voxel_(static_cast<float>(volume.options().voxel)),
       min_weight_(steps_of(static_cast<float>(volume.options().min_weight), volume.units().weight)) {}
 
@@ -70,7 +71,7 @@ bool BlockMesher::find_blocks(const BlockPosition& at) {
   bool any_inside = false, any_outside = false;
   for (int n = 0; n < 8; ++n) {  // its own cells end in the blocks behind it
     const int x = n & 1, y = n >> 1 & 1, z = n >> 2;
-    const auto number = blocks.number_of({at.x + x, at.y + y, at.z + z});
+    const auto number = neighbour({at.x + x, at.y + y, at.z + z});
     around_[kOwn + static_cast<std::size_t>(x + 3 * y + 9 * z)] = number ? &blocks[*number] : nullptr;
     if (!number) continue;
     any_inside |= blocks.head(*number).any_inside;
@@ -79,10 +80,16 @@ bool BlockMesher::find_blocks(const BlockPosition& at) {
   if (around_[kOwn] == nullptr || !any_inside || !any_outside || !find_rows()) return false;
   for (int n = 0; n < 27; ++n) {
     const int x = n % 3 - 1, y = n / 3 % 3 - 1, z = n / 9 - 1;
-    if (std::min({x, y, z}) < 0)
-      around_[static_cast<std::size_t>(n)] = blocks.find({at.x + x, at.y + y, at.z + z});
+    if (std::min({x, y, z}) >= 0) continue;
+    const auto number = neighbour({at.x + x, at.y + y, at.z + z});
+    around_[static_cast<std::size_t>(n)] = number ? &blocks[*number] : nullptr;
   }
   return true;
+}
+
+std::optional<std::uint32_t> BlockMesher::neighbour(const BlockPosition& at) const {
+  const auto number = volume_.blocks().number_of(at);
+  return number && !pending_.empty() && pending_[*number] == Pending::kOthers ? std::nullopt : number;
 }
 
 void BlockMesher::fill() {

@@ -3,6 +3,8 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -34,6 +36,9 @@ class CrossedEdges {
       before = static_cast<std::uint16_t>(before + std::popcount(bits_[w]));
     }
   }
+  [[nodiscard]] bool has(int edge) const {
+    return (bits_[static_cast<std::size_t>(edge / 64)] >> (edge % 64) & 1U) != 0;
+  }
   /// Of an edge that was added.
   [[nodiscard]] std::uint32_t number(int edge) const {
     const auto w = static_cast<std::size_t>(edge / 64);
@@ -56,6 +61,11 @@ struct VertexPlace {
   friend bool operator==(const VertexPlace&, const VertexPlace&) = default;
 };
 
+/// What is to become of a block's samples before long: a piece stays as it is until then, but for triangles
+/// that end where a neighbour has no vertex any more. Neighbours of a block that is to hold something else
+/// altogether have no triangles that end in it.
+enum class Pending : std::uint8_t { kNothing, kChanges, kOthers };
+
 /// A block's piece of the mesh: the vertices between its samples and the next ones along each axis, in the
 /// order of their edges, and the triangles of the cells whose lowest corner is one of its samples.
 struct BlockMesh {
@@ -70,8 +80,8 @@ struct BlockMesh {
 /// Marching cubes, block by block. A piece rests on the samples of its block and of the 26 around it.
 class BlockMesher {
  public:
-  /// The volume must outlive the mesher, and not change.
-  explicit BlockMesher(const SurfaceVolume& volume);
+  /// The volume and what is pending in its blocks (empty: nothing) must outlive the mesher, and not change.
+  BlockMesher(const SurfaceVolume& volume, std::span<const Pending> pending);
 
   /// Reuses what `piece` holds.
   void extract(const BlockPosition& at, BlockMesh& piece);
@@ -94,6 +104,8 @@ class BlockMesher {
   [[nodiscard]] const Row& row(int y, int z) const { return rows_[static_cast<std::size_t>(z * kRows + y)]; }
   /// Whether there is anything to be made of the block, as far as a glance tells.
   [[nodiscard]] bool find_blocks(const BlockPosition& at);
+  /// Unless it is to hold others' samples.
+  [[nodiscard]] std::optional<std::uint32_t> neighbour(const BlockPosition& at) const;
   void fill();
   void fill_row(int y, int z, std::size_t to);
   /// Whether a sample is inside that a cell of the block touches: without one there is no surface.
@@ -105,6 +117,7 @@ class BlockMesher {
   void add_triangles(BlockMesh& piece) const;
 
   const SurfaceVolume& volume_;
+  const std::span<const Pending> pending_;
   const float voxel_;
   std::uint16_t min_weight_ = 0;  // [steps]
   Around around_{};               // of the block: x + 3 y + 9 z, the block itself being 13

@@ -2,62 +2,78 @@
 
 #include <algorithm>
 
-#include "base/check.hpp"
 #include "base/right_of_way.hpp"
 
 namespace twofold {
-namespace {
 
-constexpr std::size_t kAsked = 64;  // blocks from one question to the next: about a millisecond
-
-}  // namespace
-
-std::size_t Composition::update(std::span<const PlacedVolume> volumes, double rest, const GivesUp& gives_up) {
+std::size_t Composition::update(std::span<const PlacedVolume> volumes, std::size_t most) {
   let_go_of_empty_blocks();
-  remove_all_but(volumes, rest);
+  remove_all_but(volumes);
+  (void)rejoin(volumes, rest_, most < kAll);
   for (const PlacedVolume& volume : volumes) take_changes(volume);
-  const std::size_t blocks = compose(volumes, gives_up);
-  if (unfinished()) return blocks;
-  mesh_.update(whole_);
-  mesh_at_.clear();
-  for (const auto& [id, member] : members_) mesh_at_.emplace(id, member.T_w_v);
+  mark_left();
+  const std::size_t blocks = compose(volumes, most);
+  mesh_.update(whole_, pending());
   return blocks;
 }
 
-bool Composition::rejoin_farthest(std::span<const PlacedVolume> volumes) {
-  auto farthest = members_.end();
-  double most = kRest * whole_.options().voxel;
+std::size_t Composition::settle(std::span<const PlacedVolume> volumes) {
+  (void)rejoin(volumes, 0, false);
+  return update(volumes);
+}
+
+bool Composition::rejoin(std::span<const PlacedVolume> volumes, double rest, bool mesh_moves) {
+  Steps steps;
+  std::vector<const PlacedVolume*> moved;
   for (const PlacedVolume& volume : volumes) {
-    const auto member = members_.find(volume.id);
-    if (member == members_.end()) continue;
-    const double way = farthest_way(member->second, member->second.T_w_v, volume.T_w_v);
-    if (way <= most) continue;
-    most = way;
-    farthest = member;
+    const auto found = members_.find(volume.id);
+    if (found == members_.end()) continue;
+    const Member& member = found->second;
+    Step& step = steps[volume.id];
+    step = {volume.volume, member.T_w_v.inverse()};
+    if (!has_moved(member, volume.T_w_v, rest)) continue;
+    step.motion = (volume.T_w_v * step.T_v_w).matrix().topRows<3>();
+    moved.push_back(&volume);
   }
-  if (farthest == members_.end()) return false;
-  remove(farthest->first, farthest->second);
-  members_.erase(farthest);
+  if (moved.empty()) return false;
+  if (mesh_moves) mesh_.move([&](const Vector3& x_w) { return mean_motion(steps, x_w); });
+  for (const PlacedVolume* volume : moved) {
+    Member& member = members_.at(volume->id);
+    leave(volume->id, member, has_moved(member, volume->T_w_v, rest_) ? kSoon : kLater);
+    member.T_w_v = volume->T_w_v;
+  }
   return true;
 }
 
-bool Composition::move_mesh(std::span<const PlacedVolume> volumes) {
-  std::vector<Moved> all;
-  bool any = false;
-  for (const PlacedVolume& volume : volumes) {
-    const auto member = members_.find(volume.id);
-    const auto at = mesh_at_.find(volume.id);
-    if (member == members_.end() || at == mesh_at_.end()) continue;
-    Moved moved{volume.volume, at->second.inverse(), Motion::Identity()};
-    if (farthest_way(member->second, at->second, volume.T_w_v) > rest_ * whole_.options().voxel) {
-      moved.motion = (volume.T_w_v * at->second.inverse()).matrix().topRows<3>();
-      at->second = volume.T_w_v;
-      any = true;
-    }
-    all.push_back(std::move(moved));
+/// By the corners of what it holds: no sample moves farther. What holds nothing has none.
+bool Composition::has_moved(const Member& member, const SE3& T_w_v, double rest) const {
+  if (rest == 0) return member.T_w_v.matrix() != T_w_v.matrix();
+  if (member.holds_nothing()) return false;
+  for (int c = 0; c < 8; ++c) {
+    const Vector3 corner((c & 1 ? member.high : member.low).x(), (c & 2 ? member.high : member.low).y(),
+                         (c & 4 ? member.high : member.low).z());
+    if ((T_w_v * corner - member.T_w_v * corner).norm() > rest * whole_.options().voxel) return true;
   }
-  if (any) mesh_.move([&](const Vector3& x_w) { return mean_motion(all, x_w); });
-  return any;
+  return false;
+}
+
+/// Of the volumes that a vertex there may rest on; to stand still, if there is none.
+Motion Composition::mean_motion(const Steps& steps, const Vector3& x_w) const {
+  const Vector3 at = (x_w / (kBlockEdge * whole_.options().voxel)).array().floor();
+  const auto block =
+      whole_.blocks().number_of({static_cast<std::int32_t>(at.x()), static_cast<std::int32_t>(at.y()),
+                                 static_cast<std::int32_t>(at.z())});
+  Motion sum = Motion::Zero();
+  int count = 0;
+  if (block) {
+    for (const std::uint32_t id : reached_[*block].volumes) {
+      const auto step = steps.find(id);
+      if (step == steps.end() || !has_surface(*step->second.volume, step->second.T_v_w * x_w)) continue;
+      sum += step->second.motion;
+      ++count;
+    }
+  }
+  return count > 0 ? Motion(sum / count) : Motion(Motion::Identity());
 }
 
 /// Whether a vertex at x_v may rest on the volume.
@@ -78,149 +94,184 @@ bool Composition::has_surface(const SurfaceVolume& volume, const Vector3& x_v) {
   return any_inside && any_outside;
 }
 
-/// Of the volumes that a vertex there may rest on; to stand still, if there is none.
-Motion Composition::mean_motion(std::span<const Moved> all, const Vector3& x_w) {
-  Motion sum = Motion::Zero();
-  int count = 0;
-  for (const Moved& one : all) {
-    if (!has_surface(*one.volume, one.T_v_w * x_w)) continue;
-    sum += one.motion;
-    ++count;
-  }
-  return count > 0 ? Motion(sum / count) : Motion(Motion::Identity());
-}
-
 /// Blocks are never taken out of a volume one by one: where moved volumes have left more than they are in,
-/// all begins anew.
+/// all are made anew.
 void Composition::let_go_of_empty_blocks() {
   constexpr std::size_t kFew = 1000;
   if (empty_blocks_ < std::max(kFew, whole_.blocks().size() / 2)) return;
   whole_.clear();
-  members_.clear();
-  in_block_.clear();
-  is_marked_.clear();
-  marked_.clear();
+  reached_.clear();
+  marks_.clear();
+  left_.clear();
+  begun_.clear();
+  for (auto& queue : queues_) queue.clear();
   empty_blocks_ = 0;
-}
-
-/// By the blocks that changed since it was added.
-void Composition::extend_bounds(Member& member, const SurfaceVolume& volume) const {
-  if (volume.revision() == member.revision) return;
-  make_way();
-  const double edge = kBlockEdge * whole_.options().voxel;
-  for (std::size_t b = 0; b < volume.blocks().size(); ++b) {
-    const BlockHead& block = volume.blocks().head(b);
-    if (block.revision <= member.revision) continue;
-    const Vector3 corner = edge * Vector3(block.at.x, block.at.y, block.at.z);
-    member.low = member.low.cwiseMin(corner);
-    member.high = member.high.cwiseMax(corner + Vector3::Constant(edge));
+  for (auto& [id, member] : members_) {
+    member.blocks.clear();
+    member.joined = false;
+    member.mark_as = kSoon;
   }
 }
 
-bool Composition::still_stands(Member& member, const PlacedVolume& now, double rest) const {
-  if (now.volume->cleared() > member.revision) return false;
-  extend_bounds(member, *now.volume);
-  if ((member.low.array() > member.high.array()).any()) return false;  // it holds nothing
-  if (rest == 0) return member.T_w_v.matrix() == now.T_w_v.matrix();
-  return farthest_way(member, member.T_w_v, now.T_w_v) <= rest * whole_.options().voxel;
-}
-
-/// That a sample moves [m], by the corners of what it holds: none moves farther.
-double Composition::farthest_way(const Member& member, const SE3& T_old, const SE3& T_new) {
-  double most = 0;
-  for (int c = 0; c < 8; ++c) {
-    const Vector3 corner((c & 1 ? member.high : member.low).x(), (c & 2 ? member.high : member.low).y(),
-                         (c & 4 ? member.high : member.low).z());
-    most = std::max(most, (T_new * corner - T_old * corner).norm());
-  }
-  return most;
-}
-
-void Composition::remove_all_but(std::span<const PlacedVolume> volumes, double rest) {
+void Composition::remove_all_but(std::span<const PlacedVolume> volumes) {
   for (auto member = members_.begin(); member != members_.end();) {
-    const auto now = std::find_if(volumes.begin(), volumes.end(),
-                                  [&](const PlacedVolume& volume) { return volume.id == member->first; });
-    if (now != volumes.end() && still_stands(member->second, *now, rest)) {
-      ++member;
-      continue;
-    }
-    remove(member->first, member->second);
-    member = members_.erase(member);
+    const bool stays = std::any_of(volumes.begin(), volumes.end(),
+                                   [&](const PlacedVolume& volume) { return volume.id == member->first; });
+    if (!stays) leave(member->first, member->second, kLater);
+    member = stays ? std::next(member) : members_.erase(member);
   }
 }
 
-void Composition::remove(std::uint32_t id, const Member& member) {
+void Composition::leave(std::uint32_t id, Member& member, Mark mark_as) {
   for (const std::uint32_t block : member.blocks) {
-    std::erase(in_block_[block], id);
-    empty_blocks_ += in_block_[block].empty();
-    mark(block);
+    std::vector<std::uint32_t>& volumes = reached_[block].volumes;
+    std::erase(volumes, id);
+    empty_blocks_ += volumes.empty();
+    left_.push_back({block, id, mark_as});
   }
+  member.blocks.clear();
+  member.joined = false;
+  member.mark_as = mark_as;
 }
 
-void Composition::mark(std::uint32_t block) {
-  if (is_marked_[block] != 0) return;
-  is_marked_[block] = 1;
-  marked_.push_back(block);
+/// After those that volumes have come to: a surface is where it is now before it goes where it was.
+void Composition::mark_left() {
+  for (const Left& left : left_) mark(left.block, left.volume, left.mark_as);
+  left_.clear();
 }
 
-/// Marks the blocks into which those reach that changed.
+/// Marks the blocks into which those reach that changed; all of them, if the volume has moved or was fused
+/// anew.
 void Composition::take_changes(const PlacedVolume& placed) {
+  const SurfaceVolume& volume = *placed.volume;
   const auto [found, is_new] = members_.try_emplace(placed.id);
   Member& member = found->second;
+  std::uint64_t known = member.revision;
   if (is_new) {
     member.T_w_v = placed.T_w_v;
-    extend_bounds(member, *placed.volume);
+  } else if (volume.cleared() > member.revision) {
+    leave(placed.id, member, kLater);
+    member = {};
+    member.T_w_v = placed.T_w_v;
+    member.mark_as = kLater;
+    known = volume.revision();
   }
-  if (placed.volume->revision() == member.revision) return;
-  const BlockTable& blocks = placed.volume->blocks();
-  for (std::size_t b = 0; b < blocks.size(); ++b) {
-    const BlockHead& block = blocks.head(b);
-    if (block.revision <= member.revision) continue;
-    for (const std::uint32_t reached : whole_.add_overlapped(block.at, member.T_w_v)) {
-      if (reached >= in_block_.size()) {
-        empty_blocks_ += reached + 1 - in_block_.size();
-        in_block_.resize(reached + 1);
-        is_marked_.resize(reached + 1, 0);
-      }
-      std::vector<std::uint32_t>& ids = in_block_[reached];
-      const auto at = std::lower_bound(ids.begin(), ids.end(), placed.id);
-      if (at == ids.end() || *at != placed.id) {
-        empty_blocks_ -= ids.empty();
-        ids.insert(at, placed.id);
-        member.blocks.push_back(reached);
-      }
-      mark(reached);
-    }
+  if (member.holds_nothing()) member.T_w_v = placed.T_w_v;
+  if (member.joined && volume.revision() == member.revision) return;
+  for (std::size_t b = 0; b < volume.blocks().size(); ++b) {
+    const BlockHead& block = volume.blocks().head(b);
+    if (member.joined && block.revision <= member.revision) continue;
+    join(placed.id, member, block.at, block.revision > known ? kNew : member.mark_as);
     make_way();
   }
-  member.revision = placed.volume->revision();
+  member.revision = volume.revision();
+  member.joined = true;
 }
 
-std::size_t Composition::compose(std::span<const PlacedVolume> volumes, const GivesUp& gives_up) {
-  std::map<std::uint32_t, Resampler> resamplers;
+void Composition::join(std::uint32_t id, Member& member, const BlockPosition& block, Mark mark_as) {
+  extend_bounds(member, block);
+  for (const std::uint32_t reached : whole_.add_overlapped(block, member.T_w_v)) {
+    if (reached >= reached_.size()) {
+      empty_blocks_ += reached + 1 - reached_.size();
+      reached_.resize(reached + 1);
+      marks_.resize(reached + 1, kNone);
+    }
+    std::vector<std::uint32_t>& volumes = reached_[reached].volumes;
+    const auto at = std::lower_bound(volumes.begin(), volumes.end(), id);
+    if (at == volumes.end() || *at != id) {
+      empty_blocks_ -= volumes.empty();
+      volumes.insert(at, id);
+      member.blocks.push_back(reached);
+    }
+    mark(reached, id, mark_as);
+  }
+}
+
+void Composition::extend_bounds(Member& member, const BlockPosition& block) const {
+  const double edge = kBlockEdge * whole_.options().voxel;
+  const Vector3 corner = edge * Vector3(block.x, block.y, block.z);
+  member.low = member.low.cwiseMin(corner);
+  member.high = member.high.cwiseMax(corner + Vector3::Constant(edge));
+}
+
+void Composition::mark(std::uint32_t block, std::uint32_t changed, Mark as) {
+  reached_[block].first_changed = std::min(reached_[block].first_changed, changed);
+  if (marks_[block] >= as) return;
+  marks_[block] = as;
+  queues_[as].push_back(block);
+}
+
+std::vector<Pending> Composition::pending() const {
+  std::vector<Pending> of_blocks(marks_.size());
+  std::transform(marks_.begin(), marks_.end(), of_blocks.begin(), [](Mark mark) {
+    return mark == kNone ? Pending::kNothing : mark == kSoon ? Pending::kOthers : Pending::kChanges;
+  });
+  return of_blocks;
+}
+
+bool Composition::unfinished() const {
+  return !left_.empty() ||
+         std::any_of(queues_.begin(), queues_.end(), [](const auto& queue) { return !queue.empty(); });
+}
+
+std::size_t Composition::compose(std::span<const PlacedVolume> volumes, std::size_t most) {
+  constexpr std::size_t kMostBegun = 10000;  // 40 MB, with colours
+  if (begun_.size() > kMostBegun) {
+    begun_.clear();
+    for (Reached& reached : reached_) reached.begun_before = 0;
+  }
+  Resamplers resamplers;
   for (const PlacedVolume& volume : volumes)
     resamplers.try_emplace(volume.id, *volume.volume, members_.at(volume.id).T_w_v.inverse());
-  std::vector<Resampler*> reaching;
-  std::size_t done = 0;
-  for (const std::size_t all = marked_.size(); done < all; ++done) {
-    if (gives_up && done % kAsked == kAsked - 1 &&
-        gives_up(static_cast<double>(done) / static_cast<double>(all)))
-      break;
-    const std::uint32_t block = marked_[done];
-    reaching.clear();
-    for (const std::uint32_t id : in_block_[block]) reaching.push_back(&resamplers.at(id));
-    whole_.compose_block(block, reaching);
-    is_marked_[block] = 0;
-    make_way();
+  std::size_t made = 0;
+  const auto make_some = [&](Mark marked_as, std::size_t up_to) {
+    std::deque<std::uint32_t>& queue = queues_[marked_as];
+    for (; !queue.empty() && made < up_to; queue.pop_front(), ++made_[marked_as]) {
+      if (marks_[queue.front()] != marked_as) continue;
+      make(queue.front(), marked_as, resamplers);
+      ++made;
+      make_way();
+    }
+  };
+  make_some(kNew, queues_[kSoon].empty() ? most : most / 2);  // neither waits for all of the other
+  for (const Mark next : {kSoon, kNew, kLater}) make_some(next, most);
+  return made;
+}
+
+void Composition::make(std::uint32_t block, Mark marked_as, Resamplers& resamplers) {
+  constexpr std::size_t kWorthIt = 2;
+  Reached& reached = reached_[block];
+  std::vector<Resampler*> all;
+  for (const std::uint32_t id : reached.volumes) all.push_back(&resamplers.at(id));
+  const auto before = [&](std::uint32_t id) {
+    const auto at = std::lower_bound(reached.volumes.begin(), reached.volumes.end(), id);
+    return static_cast<std::size_t>(at - reached.volumes.begin());
+  };
+  if (reached.first_changed < reached.begun_before) reached.begun_before = 0;
+  std::size_t begun = before(reached.begun_before);
+  const std::size_t unchanged = before(reached.first_changed);
+  if (marked_as == kNew && unchanged - begun >= kWorthIt) {
+    begin(block, std::span(all).subspan(begun, unchanged - begun));
+    begun = unchanged;
   }
-  marked_.erase(marked_.begin(), marked_.begin() + static_cast<std::ptrdiff_t>(done));
-  return done;
+  const VoxelBlock* from = begun > 0 ? begun_.find(whole_.blocks().head(block).at) : nullptr;
+  whole_.compose_block(block, from, std::span(all).subspan(begun));
+  reached.first_changed = kNoVolume;
+  marks_[block] = kNone;
+}
+
+/// Takes those that follow what is begun of a block into that, up to the first one that has changed.
+void Composition::begin(std::uint32_t block, std::span<Resampler* const> next) {
+  Reached& reached = reached_[block];
+  const BlockPosition at = whole_.blocks().head(block).at;
+  whole_.compose_block(block, reached.begun_before > 0 ? begun_.find(at) : nullptr, next);
+  begun_.set_samples(begun_.find_or_add(at), whole_.blocks()[block]);
+  reached.begun_before = reached.first_changed;
 }
 
 std::size_t Composition::bytes() const {
-  using Ids = decltype(in_block_)::value_type;
-  std::size_t sum = whole_.bytes() + mesh_.bytes() + in_block_.capacity() * sizeof(Ids);
-  for (const Ids& ids : in_block_) sum += ids.capacity() * sizeof(Ids::value_type);
+  std::size_t sum = whole_.bytes() + begun_.bytes() + mesh_.bytes() + reached_.capacity() * sizeof(Reached);
+  for (const Reached& block : reached_) sum += block.volumes.capacity() * sizeof(block.volumes[0]);
   for (const auto& [id, member] : members_) sum += sizeof(member) + member.blocks.capacity() * 4;
   return sum;
 }

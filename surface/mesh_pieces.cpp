@@ -64,7 +64,9 @@ void drop_unused_vertices(TriangleMesh& mesh) {
 
 }  // namespace
 
-std::vector<std::uint32_t> MeshPieces::outdated(const SurfaceVolume& volume) const {
+/// Lets go of those moved_ ones that are among them.
+std::vector<std::uint32_t> MeshPieces::outdated(const SurfaceVolume& volume,
+                                                std::span<const Pending> pending) {
   const BlockTable& blocks = volume.blocks();
   std::vector<std::uint8_t> is_outdated(blocks.size(), 0);
   for (std::size_t b = 0; b < blocks.size(); ++b) {
@@ -77,15 +79,19 @@ std::vector<std::uint32_t> MeshPieces::outdated(const SurfaceVolume& volume) con
     }
     make_way();
   }
-  for (const BlockPosition& at : moved_)
-    if (const auto block = blocks.number_of(at)) is_outdated[*block] = 1;
+  const auto stays = [&](std::uint32_t b) { return !pending.empty() && pending[b] != Pending::kNothing; };
+  std::erase_if(moved_, [&](const BlockPosition& at) {
+    const auto block = blocks.number_of(at);
+    if (block) is_outdated[*block] = 1;
+    return !block || !stays(*block);
+  });
   std::vector<std::uint32_t> all;
   for (std::uint32_t b = 0; b < is_outdated.size(); ++b)
-    if (is_outdated[b] != 0) all.push_back(b);
+    if (is_outdated[b] != 0 && !stays(b)) all.push_back(b);
   return all;
 }
 
-std::size_t MeshPieces::update(const SurfaceVolume& volume) {
+std::size_t MeshPieces::update(const SurfaceVolume& volume, std::span<const Pending> pending) {
   if (volume.revision() == seen_ && moved_.empty()) return 0;
   const std::uint64_t before = revision_++;
   bool any = false;
@@ -94,8 +100,8 @@ std::size_t MeshPieces::update(const SurfaceVolume& volume) {
     for (const auto& [at, old] : pieces_)
       if (!volume.blocks().number_of(at)) any |= replace(at, piece);
   }
-  BlockMesher mesher(volume);
-  const std::vector<std::uint32_t> blocks = outdated(volume);
+  BlockMesher mesher(volume, pending);
+  const std::vector<std::uint32_t> blocks = outdated(volume, pending);
   for (const std::uint32_t b : blocks) {
     const BlockPosition& at = volume.blocks().head(b).at;
     mesher.extract(at, piece);
@@ -104,7 +110,6 @@ std::size_t MeshPieces::update(const SurfaceVolume& volume) {
   }
   if (!any) revision_ = before;
   seen_ = volume.revision();
-  moved_.clear();
   return blocks.size();
 }
 
@@ -123,26 +128,33 @@ void MeshPieces::move(const std::function<Motion(const Vector3&)>& motion_of) {
     }
     moved_.push_back(at);
   }
-  for (const BlockPosition& at : moved_) {
-    for (int n = 0; n < 8; ++n) {  // triangles of the blocks before it end in its vertices
-      const auto piece = pieces_.find({at.x - (n & 1), at.y - (n >> 1 & 1), at.z - (n >> 2)});
-      if (piece != pieces_.end()) piece->second.revision = revision_;
-    }
+  std::sort(moved_.begin(), moved_.end());
+  moved_.erase(std::unique(moved_.begin(), moved_.end()), moved_.end());
+  for (const BlockPosition& at : moved_) touch(at);
+}
+
+/// A piece has changed: triangles of the blocks before it end in its vertices.
+void MeshPieces::touch(const BlockPosition& at) {
+  for (int n = 0; n < 8; ++n) {
+    const auto piece = pieces_.find({at.x - (n & 1), at.y - (n >> 1 & 1), at.z - (n >> 2)});
+    if (piece != pieces_.end()) piece->second.revision = revision_;
   }
 }
 
 bool MeshPieces::replace(const BlockPosition& at, const BlockMesh& piece) {
   const auto old = pieces_.find(at);
   if (old == pieces_.end()) {
-    if (!piece.empty()) pieces_.emplace(at, Piece{piece, revision_});
-    return !piece.empty();
+    if (piece.empty()) return false;
+    pieces_.emplace(at, Piece{piece, revision_});
+    touch(at);
+    return true;
   }
   if (old->second.mesh == piece) return false;
   if (piece.empty())
     old->second.mesh = BlockMesh();  // gives its memory back
   else
     old->second.mesh = piece;  // into the memory it has
-  old->second.revision = revision_;
+  touch(at);
   return true;
 }
 
@@ -162,6 +174,13 @@ MeshPieces::Behind MeshPieces::behind(const BlockPosition& at) const {
   return blocks;
 }
 
+bool MeshPieces::has_all(const Behind& blocks, const std::array<VertexPlace, 3>& triangle) {
+  return std::all_of(triangle.begin(), triangle.end(), [&](const VertexPlace& corner) {
+    const BlockMesh* block = blocks[corner.block];
+    return block != nullptr && block->edges.has(corner.edge);
+  });
+}
+
 TriangleMesh MeshPieces::piece(const BlockPosition& at) const {
   constexpr std::uint32_t kUnnamed = 0xffffffff;
   TriangleMesh mesh;
@@ -169,6 +188,7 @@ TriangleMesh MeshPieces::piece(const BlockPosition& at) const {
   if (blocks[0] == nullptr) return mesh;
   std::array<std::vector<std::uint32_t>, 8> names;
   for (const auto& triangle : blocks[0]->triangles) {
+    if (!has_all(blocks, triangle)) continue;
     std::array<std::uint32_t, 3> corners{};
     for (std::size_t i = 0; i < 3; ++i) {
       const BlockMesh& block = *blocks[triangle[i].block];
@@ -213,7 +233,8 @@ TriangleMesh MeshPieces::joined(int min_triangles) const {
     const auto name = [&](const VertexPlace& place) {
       return begin[place.block] + blocks[place.block]->edges.number(place.edge);
     };
-    for (const auto& t : piece.mesh.triangles) mesh.triangles.push_back({name(t[0]), name(t[1]), name(t[2])});
+    for (const auto& t : piece.mesh.triangles)
+      if (has_all(blocks, t)) mesh.triangles.push_back({name(t[0]), name(t[1]), name(t[2])});
   }
   drop_small_pieces(mesh, min_triangles);
   return mesh;

@@ -22,10 +22,11 @@ using Motion = Eigen::Matrix<double, 3, 4>;
 class MeshPieces {
  public:
   /// Takes over what changed in the volume since the last call, which was of the same volume.
+  /// @param pending  of the volume's blocks; empty: nothing is
   /// @return  pieces extracted
-  std::size_t update(const SurfaceVolume& volume);
+  std::size_t update(const SurfaceVolume& volume, std::span<const Pending> pending = {});
 
-  /// Moves pieces, until the next update makes them anew; neighbours still share their vertices.
+  /// Moves pieces, until an update makes them anew; neighbours still share their vertices.
   /// @param motion_of  a piece's, asked for one of its vertices
   void move(const std::function<Motion(const Vector3&)>& motion_of);
 
@@ -53,8 +54,12 @@ class MeshPieces {
   using Behind = std::array<const BlockMesh*, 8>;
 
   [[nodiscard]] Behind behind(const BlockPosition& at) const;
+  /// Whether a triangle's vertices are there still, though neighbours may have been made anew alone.
+  [[nodiscard]] static bool has_all(const Behind& blocks, const std::array<VertexPlace, 3>& triangle);
   /// Which of the volume's blocks have a piece that rests on samples that changed.
-  [[nodiscard]] std::vector<std::uint32_t> outdated(const SurfaceVolume& volume) const;
+  [[nodiscard]] std::vector<std::uint32_t> outdated(const SurfaceVolume& volume,
+                                                    std::span<const Pending> pending);
+  void touch(const BlockPosition& at);
   bool replace(const BlockPosition& at, const BlockMesh& piece);
 
   std::map<BlockPosition, Piece> pieces_;

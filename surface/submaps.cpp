@@ -95,25 +95,37 @@ void SubmapSurface::move_submaps(const GraphSnapshot& graph) {
   }
 }
 
+/// The one that is begun first, then those that are bent most.
 void SubmapSurface::fuse_bent(std::size_t most) {
   std::vector<std::pair<double, Submap*>> bent;
-  for (const auto& submap : submaps_)
-    if (const double bend = bend_of(*submap); bend > kBend * options_.voxel)
-      bent.emplace_back(bend, submap.get());
-  if (bent.size() > most)
-    std::stable_sort(bent.begin(), bent.end(),
-                     [](const auto& a, const auto& b) { return a.first > b.first; });
-  const std::size_t now = std::min(most, bent.size());
-  for (std::size_t n = 0; n < now; ++n) fuse_anew(*bent[n].second);
-  bent_ = bent.size() - now;
+  for (const auto& submap : submaps_) {
+    const double bend = submap->anew ? std::numeric_limits<double>::infinity() : bend_of(*submap);
+    if (bend > kBend * options_.voxel) bent.emplace_back(bend, submap.get());
+  }
+  std::stable_sort(bent.begin(), bent.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  bent_ = bent.size();
+  for (auto next = bent.begin(); next != bent.end() && most > 0; ++next) {
+    most -= fuse_anew(*next->second, most);
+    bent_ -= !next->second->anew;
+  }
 }
 
 /// Other submaps' images are not asked again about what they hide: the map may have culled their keyframes.
-void SubmapSurface::fuse_anew(Submap& submap) {
-  const std::shared_ptr<const FreeSpace> before = submap.content.free;
-  submap.content = submap.content.emptied();
-  for (Member& member : submap.members) report_.fused_anew += fuse(submap, member, {});
-  if (before != nullptr) submap.content.free_to_change().forget_as(*before);
+std::size_t SubmapSurface::fuse_anew(Submap& submap, std::size_t most) {
+  if (!submap.anew) submap.anew.emplace(options_, limits_);
+  std::size_t fused = 0;
+  for (Member& member : submap.members) {
+    if (member.T_k_s_anew) continue;
+    if (fused == most) return fused;
+    ++fused;
+    member.T_k_s_anew = member.T_k_w * submap.T_w_s;
+    report_.fused_anew += fuse(*submap.anew, member, *member.T_k_s_anew, {});
+  }
+  submap.anew->replace(submap.content);
+  submap.content = std::move(*submap.anew);
+  submap.anew.reset();
+  for (Member& member : submap.members) member.T_k_s = *std::exchange(member.T_k_s_anew, std::nullopt);
+  return fused;
 }
 
 /// By how much a point that one of the keyframes sees would be fused elsewhere now, at most [m].
@@ -166,7 +178,8 @@ void SubmapSurface::add_keyframe(const GraphSnapshot& graph, const Keyframe& key
   member.packed = std::move(frame.packed);
   member.reach = std::max(keyframe.median_depth, rig_.depth_min);
   member.T_k_w = keyframe.T_k_w;
-  const bool any = fuse(submap, member, std::move(frame.images));
+  member.T_k_s = member.T_k_w * submap.T_w_s;
+  const bool any = fuse(submap.content, member, member.T_k_s, std::move(frame.images));
   if (any && limits_.free_space) forget_hidden(submap, member.T_k_w);
   report_.without_readings += !any;
   submap.members.push_back(std::move(member));
@@ -192,24 +205,24 @@ SubmapSurface::Submap& SubmapSurface::submap_for(const GraphSnapshot& graph, con
   if (best != nullptr) return *best;
   const SE3 T_k_w = graph.T_k_w(keyframe.id);
   const SE3 T_w_s = begin_of_submap(T_k_w, options_.voxel);
-  submaps_.push_back(std::make_unique<Submap>(Submap{next_submap_++,
-                                                     keyframe.id,
-                                                     T_k_w * T_w_s,
-                                                     T_w_s,
-                                                     keyframe.part,
-                                                     {},
-                                                     Submap::Content(options_, limits_)}));
+  submaps_.push_back(std::make_unique<Submap>(Submap{.id = next_submap_++,
+                                                     .hung_on = keyframe.id,
+                                                     .T_k_s = T_k_w * T_w_s,
+                                                     .T_w_s = T_w_s,
+                                                     .part = keyframe.part,
+                                                     .members = {},
+                                                     .content = Submap::Content(options_, limits_),
+                                                     .anew = {}}));
   return *submaps_.back();
 }
 
-bool SubmapSurface::fuse(Submap& submap, Member& member, DepthImages images) {
+bool SubmapSurface::fuse(Submap::Content& into, const Member& member, const SE3& T_k_s, DepthImages images) {
   const std::int64_t begin_ns = thread_cpu_ns();
   if (images.depth.empty()) images = unpacked(member.packed);
   prepare_depth_view(rig_, images.depth, images.colour, view_);
-  member.T_k_s = member.T_k_w * submap.T_w_s;
   const bool any = share_of_readings(view_) > 0;
-  if (any) submap.content.volume_to_change().fuse(view_, member.T_k_s);
-  if (any && limits_.free_space) submap.content.free_to_change().add(view_, member.T_k_s);
+  if (any) into.volume_to_change().fuse(view_, T_k_s);
+  if (any && limits_.free_space) into.free_to_change().add(view_, T_k_s);
   report_.fused += any;
   report_.fusion_ns += thread_cpu_ns() - begin_ns;
   return any;
@@ -225,12 +238,9 @@ SubmapSurface::Submap::Content::Content(const SurfaceOptions& options, const Sub
     : volume(std::make_shared<SurfaceVolume>(options)),
       free(submaps.free_space ? std::make_shared<FreeSpace>(options, submaps.max_free_depth) : nullptr) {}
 
-SubmapSurface::Submap::Content SubmapSurface::Submap::Content::emptied() const {
-  Content empty = *this;
-  empty.volume = std::make_shared<SurfaceVolume>(volume->emptied());
-  if (free != nullptr) empty.free = std::make_shared<FreeSpace>(free->emptied());
-  empty.volume_shared = empty.free_shared = false;
-  return empty;
+void SubmapSurface::Submap::Content::replace(const Content& before) {
+  volume->replace(*before.volume);
+  if (free != nullptr) free->forget_as(*before.free);
 }
 
 std::size_t SubmapSurface::Submap::Content::bytes() const {
@@ -286,7 +296,7 @@ std::size_t SubmapSurface::bytes() const {
   for (const Waiting& frame : waiting_)
     sum += bytes_of(frame.packed) + bytes_of(frame.images.depth) + bytes_of(frame.images.colour);
   for (const auto& submap : submaps_) {
-    sum += submap->content.bytes();
+    sum += submap->content.bytes() + (submap->anew ? submap->anew->bytes() : 0);
     for (const Member& member : submap->members) sum += bytes_of(member.packed);
   }
   return sum;

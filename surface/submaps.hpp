@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "graph/snapshot.hpp"
@@ -30,10 +31,10 @@ struct SubmapOptions {
   [[nodiscard]] std::string invalid_reason() const;
 };
 
-/// How much of what waits a step does at most.
+/// How many keyframes a step fuses at most, of those that wait.
 struct SubmapWork {
-  std::size_t keyframes = std::numeric_limits<std::size_t>::max();  ///< new ones, fused
-  std::size_t anew = std::numeric_limits<std::size_t>::max();       ///< bent submaps, fused anew
+  std::size_t keyframes = std::numeric_limits<std::size_t>::max();  ///< new ones
+  std::size_t anew = std::numeric_limits<std::size_t>::max();       ///< of bent submaps, fused anew
 };
 
 /// What a frame that is to become a keyframe gives to the surface.
@@ -94,10 +95,13 @@ class SubmapSurface {
   ///                unpacked
   void offer(KeyframeDepth frame, DepthImages images = {});
   /// Takes the map as it is now. Versions do not shrink. Submaps move with their keyframes in any case, which
-  /// takes no time; what `work` leaves waits for later steps, of bent submaps those that are bent least.
+  /// takes no time; what `work` leaves waits for later steps, of bent submaps those that are bent least. A
+  /// submap stays as it was until all its keyframes are fused anew.
   void step(const GraphSnapshot& graph, const SubmapWork& work = {});
   /// Submaps that are bent and wait to be fused anew.
   [[nodiscard]] std::size_t bent() const { return bent_; }
+  /// Keyframes of the last step's map whose depth is not fused yet, be it that it has not come.
+  [[nodiscard]] std::size_t unfused() const { return without_depth_.size(); }
   /// Whether the last step left anything to do in the map it had.
   [[nodiscard]] bool unfinished() const { return bent_ > 0 || keyframes_left_; }
 
@@ -121,9 +125,10 @@ class SubmapSurface {
   struct Member {
     KeyframeId id = kNoKeyframe;
     KeyframeDepth packed;
-    double reach = 1;  ///< depth that is seen [m]
-    SE3 T_k_w;         ///< in the last step
-    SE3 T_k_s;         ///< along which it was fused
+    double reach = 1;               ///< depth that is seen [m]
+    SE3 T_k_w;                      ///< in the last step
+    SE3 T_k_s;                      ///< along which it was fused
+    std::optional<SE3> T_k_s_anew;  ///< the same in Submap::anew
   };
   struct Submap {
     std::uint32_t id = 0;
@@ -138,14 +143,15 @@ class SubmapSurface {
       [[nodiscard]] SurfaceVolume& volume_to_change();
       [[nodiscard]] FreeSpace& free_to_change();
       [[nodiscard]] std::size_t bytes() const;
-      /// With nothing in it, to fuse anew. What somebody else has stays as it is, and is not copied.
-      [[nodiscard]] Content emptied() const;
+      /// Takes the place of what was fused along other poses.
+      void replace(const Content& before);
 
       std::shared_ptr<SurfaceVolume> volume;
       std::shared_ptr<FreeSpace> free;  ///< null unless SubmapOptions::free_space
       bool volume_shared = false, free_shared = false;
     };
     Content content;
+    std::optional<Content> anew;  ///< what is to take its place, as far as keyframes are fused anew
   };
 
   void let_go_of_culled(const GraphSnapshot& graph);
@@ -158,11 +164,12 @@ class SubmapSurface {
   void add_keyframe(const GraphSnapshot& graph, const Keyframe& keyframe, Waiting frame);
   [[nodiscard]] Submap& submap_for(const GraphSnapshot& graph, const Keyframe& keyframe);
   void fuse_bent(std::size_t most);
-  void fuse_anew(Submap& submap);
+  /// @return  keyframes fused
+  std::size_t fuse_anew(Submap& submap, std::size_t most);
   [[nodiscard]] double bend_of(const Submap& submap) const;
   /// False for an image without readings, of which nothing becomes.
   /// @param images  empty: those that the member has packed
-  bool fuse(Submap& submap, Member& member, DepthImages images);
+  bool fuse(Submap::Content& into, const Member& member, const SE3& T_k_s, DepthImages images);
   /// What the image that was fused last hides is not known to be free any more in any other submap.
   void forget_hidden(const Submap& fused_into, const SE3& T_k_w);
 

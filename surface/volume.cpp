@@ -60,11 +60,10 @@ std::vector<std::uint32_t> SurfaceVolume::add_overlapped(const BlockPosition& of
   return overlapped;
 }
 
-void SurfaceVolume::compose_block(std::uint32_t block, std::span<Resampler* const> others) {
+void SurfaceVolume::compose_block(std::uint32_t block, const VoxelBlock* begun,
+                                  std::span<Resampler* const> others) {
+  blocks_.set_samples(block, begun != nullptr ? *begun : VoxelBlock());
   VoxelBlock& own = blocks_[block];
-  own.distance.fill(0);
-  own.weight.fill(0);
-  if (own.colour != nullptr) own.colour->samples.fill(0);
   for (Resampler* other : others) (void)other->add_to(blocks_, own);
   blocks_.head(block).all_free = false;
   blocks_.set_changed(block, ++revision_);

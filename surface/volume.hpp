@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -50,18 +51,17 @@ class SurfaceVolume {
     blocks_.clear();
     cleared_ = ++revision_;
   }
-  /// What clear would leave of this one, which stays as it is: revisions go on.
-  [[nodiscard]] SurfaceVolume emptied() const {
-    SurfaceVolume empty(options_);
-    empty.cleared_ = empty.revision_ = revision_ + 1;
-    return empty;
+  /// Stands for another one from here on, as if that had been cleared and filled anew: revisions go on.
+  void replace(const SurfaceVolume& other) {
+    cleared_ = revision_ = std::max(revision_, other.revision_) + 1;
   }
 
   /// Blocks of this volume that a block of another one, whose frame lies at T_v_o, has a say in; those that
   /// were missing are there then, empty. Numbers, each once.
   [[nodiscard]] std::vector<std::uint32_t> add_overlapped(const BlockPosition& of_other, const SE3& T_v_o);
   /// Makes a block what other volumes say, added in this order.
-  void compose_block(std::uint32_t block, std::span<Resampler* const> others);
+  /// @param begun  what those say that come before them; null: there are none
+  void compose_block(std::uint32_t block, const VoxelBlock* begun, std::span<Resampler* const> others);
 
   /// Nothing where one of the eight samples around it was never seen.
   [[nodiscard]] std::optional<SurfaceDistance> distance(const Vector3& x_v) const;

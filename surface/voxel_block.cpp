@@ -60,6 +60,16 @@ void BlockTable::grow() {
     slots_[slot_of(heads_[b].at)] = {heads_[b].at, static_cast<std::uint32_t>(b)};
 }
 
+void BlockTable::set_samples(std::size_t i, const VoxelBlock& other) {
+  VoxelBlock& own = blocks_[i];
+  own.distance = other.distance;
+  own.weight = other.weight;
+  if (other.colour != nullptr)
+    colour_for(own) = *other.colour;
+  else if (own.colour != nullptr)
+    own.colour->samples.fill(0);
+}
+
 void BlockTable::set_changed(std::size_t i, std::uint64_t revision) {
   const VoxelBlock& block = (*this)[i];
   LaneShort inside{}, outside{};

@@ -110,6 +110,8 @@ class BlockTable {
   }
   [[nodiscard]] BlockHead& head(std::size_t i) { return heads_[i]; }
   [[nodiscard]] const BlockHead& head(std::size_t i) const { return heads_[i]; }
+  /// Those of another table's block, and its colours.
+  void set_samples(std::size_t i, const VoxelBlock& other);
   /// A block's samples have changed: its head says so, and on which sides of the surface they are.
   void set_changed(std::size_t i, std::uint64_t revision);
   /// In the order of their positions.

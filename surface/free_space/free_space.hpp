@@ -44,8 +44,6 @@ class FreeSpace {
     groups_.clear();
     hidden_.clear();
   }
-  /// Another one of the same options and reach, in which nothing is free.
-  [[nodiscard]] FreeSpace emptied() const { return {options_, reach_}; }
 
   /// Whether the cell was looked through, whatever the volume has there by now.
   [[nodiscard]] bool contains(const BlockPosition& cell) const;

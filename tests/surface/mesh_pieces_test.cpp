@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <deque>
+#include <map>
 #include <random>
 #include <vector>
 
@@ -182,25 +184,22 @@ TEST_F(CompositionTest, FollowsOnlyWhatMovesByHalfAVoxel) {
   EXPECT_TRUE(composition_.mesh().joined(options().min_triangles) == mesh_of_all());
 }
 
-TEST_F(CompositionTest, WhatMayRestIsJoinedAnewOneByOneTheFarthestFirst) {
+TEST_F(CompositionTest, WhatMayRestIsJoinedAnewOnDemandIfItMovedByHalfAVoxel) {
   Composition patient(options(), 2);
   patient.update(placed_);
-  const std::vector<PlacedVolume> before = placed_;
+  std::vector<PlacedVolume> now = placed_;
   move(0, 1.0 * options().voxel);
   move(1, 0.4 * options().voxel);
   move(2, 1.5 * options().voxel);
   EXPECT_EQ(patient.update(placed_), 0u);
-  for (const std::size_t next : {2u, 0u}) {
-    ASSERT_TRUE(patient.rejoin_farthest(placed_));
-    EXPECT_GT(patient.update(placed_), 0u);
-    std::vector<PlacedVolume> now = before;
-    now[2] = placed_[2];
-    if (next == 0) now[0] = placed_[0];
-    Composition wanted(options());
-    wanted.update(now);
-    EXPECT_TRUE(patient.mesh().joined(0) == wanted.mesh().joined(0)) << "volume " << next;
-  }
-  EXPECT_FALSE(patient.rejoin_farthest(placed_)) << "less than half a voxel";
+  ASSERT_TRUE(patient.rejoin(placed_));
+  EXPECT_GT(patient.update(placed_), 0u);
+  now[0] = placed_[0];
+  now[2] = placed_[2];
+  Composition wanted(options());
+  wanted.update(now);
+  EXPECT_TRUE(patient.mesh().joined(0) == wanted.mesh().joined(0));
+  EXPECT_FALSE(patient.rejoin(placed_)) << "less than half a voxel";
   move(1, 2.0 * options().voxel);
   EXPECT_GT(patient.update(placed_), 0u) << "more than may rest";
 }
@@ -226,64 +225,134 @@ TEST_F(CompositionTest, FollowsAVolumeThatHadNothingYet) {
   EXPECT_TRUE(composition_.mesh().joined(options().min_triangles) == mesh_of_all());
 }
 
-TEST_F(CompositionTest, WhatItGivesUpIsDoneByTheNextCall) {
+TEST_F(CompositionTest, WhatMovedIsMadeAnewAFewBlocksAtATime) {
   const std::size_t all = composition_.update(placed_);
   ASSERT_GT(all, 200u);
-  const TriangleMesh before = composition_.mesh().joined(0);
-  move(0, 0.3);
-  move(1, 0.3);
-  move(2, 0.3);
-  std::size_t asked = 0;
-  const std::size_t some = composition_.update(placed_, [&](double done) {
-    ++asked;
-    EXPECT_LT(done, 1);
-    return done > 0.2;
-  });
-  EXPECT_GT(asked, 0u);
-  EXPECT_GT(some, 0u);
+  for (std::size_t n = 0; n < 3; ++n) move(n, 0.3);
+  EXPECT_EQ(composition_.update(placed_, 100), 100u);
   EXPECT_TRUE(composition_.unfinished());
-  EXPECT_TRUE(composition_.mesh().joined(0) == before) << "a mesh of two places at once";
   move(2, -0.1);
-  EXPECT_GT(composition_.update(placed_), 0u);
-  EXPECT_FALSE(composition_.unfinished());
+  // Whoever shows pieces asks for those that changed, and has all as they are.
+  std::map<BlockPosition, TriangleMesh> shown;
+  std::uint64_t revision = 0;
+  std::size_t updates = 0;
+  for (; composition_.unfinished(); ++updates) {
+    EXPECT_LE(composition_.update(placed_, 100), 100u);
+    const MeshPieces& mesh = composition_.mesh();
+    for (const BlockPosition& at : mesh.changed_since(revision)) shown[at] = mesh.piece(at);
+    revision = mesh.revision();
+    for (const BlockPosition& at : mesh.changed_since(0)) ASSERT_TRUE(shown[at] == mesh.piece(at));
+  }
+  EXPECT_GT(updates, all / 100 - 1);
   EXPECT_TRUE(composition_.mesh().joined(options().min_triangles) == mesh_of_all());
 }
 
-TEST_F(CompositionTest, TheMeshMovesAsOneWithItsVolumesAndIsMadeAnewAfterwards) {
+TEST_F(CompositionTest, WhatIsNewOvertakesWhatMoved) {
+  composition_.update(placed_);
+  for (std::size_t n = 0; n < 3; ++n) move(n, 0.3);
+  composition_.update(placed_, 0);
+  ASSERT_TRUE(composition_.unfinished());
+  volumes_.emplace_back(options());
+  views_.fuse_ball(volumes_.back(), {{0, 0, 0}, 0.1});
+  placed_.push_back({7, &volumes_.back(), SE3(SO3(), Vector3(5, 0, 0))});  // alone
+  composition_.update(placed_, 0);
+  const std::uint64_t wanted = composition_.of_new().marked;
+  while (composition_.of_new().made < wanted) EXPECT_LE(composition_.update(placed_, 40), 40u);
+  EXPECT_LT(composition_.of_moved().made, composition_.of_moved().marked);
+  const TriangleMesh mesh = composition_.mesh().joined(0);
+  SurfaceVolume ball(options());
+  ball.add(volumes_.back(), placed_.back().T_w_v);
+  const auto far = [](const Eigen::Vector3f& x) { return x.x() > 3; };
+  EXPECT_EQ(static_cast<std::size_t>(std::count_if(mesh.positions.begin(), mesh.positions.end(), far)),
+            extract_mesh(ball).positions.size());
+  EXPECT_TRUE(composition_.unfinished());
+  composition_.update(placed_);
+  EXPECT_TRUE(composition_.mesh().joined(options().min_triangles) == mesh_of_all());
+}
+
+/// A camera looks at what others see, too, and what they say is not asked for each time.
+TEST_F(CompositionTest, IsTheSumOfItsVolumesWhicheverOfThemChange) {
+  std::mt19937 random(5);
+  for (int n = 0; n < 5; ++n) {
+    volumes_.emplace_back(options());
+    views_.fuse_next(volumes_.back());
+    placed_.push_back({static_cast<std::uint32_t>(3 + n), &volumes_.back(),
+                       SE3(SO3::exp(Vector3(0.02 * n, 0, 0.1)), {0, 0.02 * n, 0})});
+  }
+  for (int n = 0; n < 60; ++n) {
+    const std::size_t changed = std::uniform_int_distribution<std::size_t>(0, volumes_.size() - 1)(random);
+    const std::size_t what = std::uniform_int_distribution<std::size_t>(0, 9)(random);
+    if (what == 0) move(changed, 0.1);
+    if (what == 1) volumes_[changed].clear();
+    if (what == 2 && placed_.size() > 5) placed_.erase(placed_.begin());
+    if (what > 2) views_.fuse_next(volumes_[changed]);
+    composition_.update(placed_, n % 3 == 0 ? 100 : Composition::kAll);
+    if (n % 10 == 9) expect_same("whatever");
+  }
+}
+
+/// Distance of a mesh's vertices from where others stand, at most.
+double farthest(const TriangleMesh& mesh, const TriangleMesh& others) {
+  double most = 0;
+  for (const Eigen::Vector3f& x : mesh.positions) {
+    double nearest = 1e300;
+    for (const Eigen::Vector3f& y : others.positions)
+      nearest = std::min<double>(nearest, (x - y).squaredNorm());
+    most = std::max(most, std::sqrt(nearest));
+  }
+  return most;
+}
+
+double longest_edge(const TriangleMesh& mesh) {
+  double most = 0;
+  for (const auto& t : mesh.triangles)
+    for (std::size_t i = 0; i < 3; ++i)
+      most = std::max<double>(most, (mesh.positions[t[i]] - mesh.positions[t[(i + 1) % 3]]).norm());
+  return most;
+}
+
+TEST_F(CompositionTest, TheMeshMovesWithItsVolumesUntilItIsMadeAnew) {
   composition_.update(placed_);
   const TriangleMesh before = composition_.mesh().joined(0);
   const std::uint64_t revision = composition_.mesh().revision();
-  EXPECT_FALSE(composition_.move_mesh(placed_));
   const SE3 T_new_old(SO3::exp(Vector3(0.02, 0.3, -0.1)), Vector3(0.3, -0.2, 0.5));
   for (PlacedVolume& volume : placed_) volume.T_w_v = T_new_old * volume.T_w_v;
-  ASSERT_TRUE(composition_.move_mesh(placed_));
+  composition_.update(placed_, 0);
   const TriangleMesh moved = composition_.mesh().joined(0);
   ASSERT_TRUE(moved.triangles == before.triangles);
   EXPECT_EQ(composition_.mesh().changed_since(revision), composition_.mesh().changed_since(0));
   for (std::size_t v = 0; v < moved.positions.size(); ++v) {
-    const Vector3 wanted = T_new_old * before.positions[v].cast<double>();
-    ASSERT_LT((moved.positions[v].cast<double>() - wanted).norm(), 1e-5);
+    const Vector3 at = T_new_old * before.positions[v].cast<double>();
+    ASSERT_LT((moved.positions[v].cast<double>() - at).norm(), 1e-5);
     ASSERT_LT(
         (moved.normals[v].cast<double>() - T_new_old.rotation() * before.normals[v].cast<double>()).norm(),
         1e-5);
   }
-  EXPECT_FALSE(composition_.move_mesh(placed_)) << "moved twice";
+  composition_.update(placed_, 0);
+  EXPECT_TRUE(composition_.mesh().joined(0) == moved) << "moved twice";
+  // By turns: all that is drawn is near where the surface is in the end.
+  Composition in_the_end(options());
+  in_the_end.update(placed_);
+  const TriangleMesh wanted = in_the_end.mesh().joined(0);
+  for (int n = 0; n < 3; ++n) {
+    composition_.update(placed_, 150);
+    ASSERT_TRUE(composition_.unfinished());
+    const TriangleMesh between = composition_.mesh().joined(0);
+    EXPECT_GT(between.triangles.size(), wanted.triangles.size() / 2);
+    EXPECT_LT(farthest(between, wanted), 3 * options().voxel);
+    EXPECT_LT(longest_edge(between), 3 * options().voxel);
+  }
   composition_.update(placed_);
-  EXPECT_TRUE(composition_.mesh().joined(options().min_triangles) == mesh_of_all());
+  EXPECT_TRUE(composition_.mesh().joined(0) == wanted);
 }
 
-TEST_F(CompositionTest, TheMeshMovesToWhereItsVolumesAreWhenAnUpdateGaveUpMeanwhile) {
+TEST_F(CompositionTest, ASecondMoveTakesAlongWhatIsNotMadeAnewYet) {
   composition_.update(placed_);
   const TriangleMesh before = composition_.mesh().joined(0);
-  for (std::size_t n = 0; n < 3; ++n) move(n, 0.3);
-  composition_.move_mesh(placed_);
-  const std::vector<PlacedVolume> first = placed_;
-  for (std::size_t n = 0; n < 3; ++n) move(n, -0.1);
-  composition_.update(first, [&](double) {
-    composition_.move_mesh(placed_);
-    return true;
-  });
-  ASSERT_TRUE(composition_.unfinished());
+  for (const double by : {0.3, -0.1}) {
+    for (std::size_t n = 0; n < 3; ++n) move(n, by);
+    composition_.update(placed_, 0);
+  }
   const TriangleMesh moved = composition_.mesh().joined(0);
   ASSERT_EQ(moved.positions.size(), before.positions.size());
   for (std::size_t v = 0; v < moved.positions.size(); ++v)
@@ -297,7 +366,7 @@ TEST_F(CompositionTest, OnlyTheMeshOfAVolumeThatMovedMoves) {
   composition_.update(placed_);
   const TriangleMesh before = composition_.mesh().joined(0);
   move(2, 0.3);
-  ASSERT_TRUE(composition_.move_mesh(placed_));
+  composition_.update(placed_, 0);
   const TriangleMesh moved = composition_.mesh().joined(0);
   std::size_t far = 0;
   for (std::size_t v = 0; v < moved.positions.size(); ++v) {
@@ -314,7 +383,7 @@ TEST_F(CompositionTest, VolumesThatOverlapMoveTheirMeshBetweenThem) {
   composition_.update(placed_);
   const TriangleMesh before = composition_.mesh().joined(0);
   move(0, 0.3);
-  ASSERT_TRUE(composition_.move_mesh(placed_));
+  composition_.update(placed_, 0);
   const TriangleMesh moved = composition_.mesh().joined(0);
   std::size_t between = 0;
   for (std::size_t v = 0; v < moved.positions.size(); ++v) {

@@ -1,6 +1,7 @@
 #include "apps/twofold/surface/live_mesh.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "base/processor_time.hpp"
 #include "engine/stage_timer.hpp"
@@ -14,85 +15,89 @@ void LiveMesh::published(const GraphSnapshot& graph) {
   last_change_ = change;
 }
 
-void LiveMesh::follow(const SubmapSurface& surface, const GraphSnapshot& graph) {
-  if (graph.reference() == kNoKeyframe || graph.last_change().version <= followed_) return;
-  followed_ = graph.last_change().version;
-  const KeyframeId part = graph.part(graph.reference());
-  followed_to_ = surface.placed_in(graph, part);
-  (void)composition_.move_mesh(followed_to_);
-  tell(part);
-  take_followed(graph.version());
-}
-
-bool LiveMesh::update(const SubmapSurface& surface, const GraphSnapshot& graph,
-                      const Composition::GivesUp& gives_up) {
-  if (graph.reference() == kNoKeyframe) return true;
-  const KeyframeId part = part_ = graph.part(graph.reference());
-  followed_to_.clear();
+void LiveMesh::update(const SubmapSurface& surface, const GraphSnapshot& graph, std::size_t most) {
+  if (graph.reference() == kNoKeyframe) return;
+  part_ = graph.part(graph.reference());
   const std::int64_t begin_ns = thread_cpu_ns();
-  const std::size_t blocks = composition_.update(surface.placed(part), gives_up);
+  follow_correction(surface, graph);
+  const std::size_t blocks = composition_.update(surface.placed(part_), most);
   if (blocks > 0) {
     ++updates_;
     blocks_ += blocks;
     cpu_ns_ += thread_cpu_ns() - begin_ns;
-    most_bytes_ = std::max(most_bytes_, composition_.bytes());
   }
-  if (composition_.unfinished()) return false;
-  if (!followed_to_.empty()) (void)composition_.move_mesh(followed_to_);
-  tell(part);
-  take_times(graph.version());
+  tell();
+  take_times(surface, graph.version());
+  take_joined();
   take_settled(surface);
-  return true;
+  if (blocks > 0 && !unfinished()) most_bytes_ = std::max(most_bytes_, composition_.bytes());
 }
 
-bool LiveMesh::rejoin_farthest(const SubmapSurface& surface) {
-  return part_ != kNoKeyframe && composition_.rejoin_farthest(surface.placed(part_));
+void LiveMesh::follow_correction(const SubmapSurface& surface, const GraphSnapshot& graph) {
+  if (graph.last_change().version <= corrected_) return;
+  corrected_ = graph.last_change().version;
+  (void)rejoin(surface);
+  tell();
+  read_times();
+  const std::int64_t now_ns = steady_now_ns();
+  for (MapTime& time : map_times_) {
+    if (time.version > graph.version() || !std::exchange(time.changed, false)) continue;
+    moved_.record(now_ns - time.published_ns);
+    unjoined_.push_back({time.published_ns, {}});
+    if (!unsettled_ns_) unsettled_ns_ = time.published_ns;
+  }
 }
 
-void LiveMesh::tell(KeyframeId part) {
+bool LiveMesh::urgent() const {
+  const auto waits = [](const Composition::Progress& of) { return of.made < of.marked; };
+  return waits(composition_.of_new()) || waits(composition_.of_moved());
+}
+
+bool LiveMesh::rejoin(const SubmapSurface& surface) {
+  return part_ != kNoKeyframe && composition_.rejoin(surface.placed(part_));
+}
+
+void LiveMesh::tell() {
   if (composition_.mesh().revision() == revision_) return;
   revision_ = composition_.mesh().revision();
-  if (listener_) listener_(composition_.mesh(), part);
+  if (listener_) listener_(composition_.mesh(), part_);
 }
 
 void LiveMesh::read_times() {
   for (MapTime time; times_.try_pop(time);) map_times_.push_back(time);
 }
 
-/// The mesh has moved as the corrections up to this version of the map say.
-void LiveMesh::take_followed(std::uint64_t version) {
+/// All that is new in this version of the map is marked now, unless depth has not come yet.
+void LiveMesh::take_times(const SubmapSurface& surface, std::uint64_t version) {
   read_times();
+  const auto [marked, made] = composition_.of_new();
   const std::int64_t now_ns = steady_now_ns();
-  for (MapTime& time : map_times_) {
-    if (time.version > version) return;
-    if (!time.changed || time.followed) continue;
-    loops_.record(now_ns - time.published_ns);
-    time.followed = true;
-  }
+  for (MapTime& time : map_times_)
+    if (time.version <= version && !time.made_until && surface.unfused() == 0) time.made_until = marked;
+  const auto is_in = [&](const MapTime& time) { return time.made_until && *time.made_until <= made; };
+  for (; !map_times_.empty() && is_in(map_times_.front()); map_times_.pop_front())
+    behind_.record(now_ns - map_times_.front().published_ns);
 }
 
-/// The mesh is now that of this version of the map.
-void LiveMesh::take_times(std::uint64_t version) {
-  take_followed(version);
-  const std::int64_t now_ns = steady_now_ns();
-  for (; !map_times_.empty() && map_times_.front().version <= version; map_times_.pop_front()) {
-    const MapTime& time = map_times_.front();
-    behind_.record(now_ns - time.published_ns);
-    if (!time.changed) continue;
-    joined_.record(now_ns - time.published_ns);
-    if (!unsettled_ns_) unsettled_ns_ = time.published_ns;
-  }
+void LiveMesh::take_joined() {
+  const auto [marked, made] = composition_.of_moved();
+  for (Correction& correction : unjoined_)
+    if (!correction.made_until) correction.made_until = marked;
+  for (; !unjoined_.empty() && *unjoined_.front().made_until <= made; unjoined_.pop_front())
+    joined_.record(steady_now_ns() - unjoined_.front().published_ns);
 }
 
 /// All that corrections bent is fused anew now, from the oldest of those on.
 void LiveMesh::take_settled(const SubmapSurface& surface) {
-  if (!unsettled_ns_ || surface.bent() > 0) return;
-  settled_.record(steady_now_ns() - *unsettled_ns_);
-  unsettled_ns_.reset();
+  if (unsettled_ns_ && surface.bent() == 0 && !unfinished())
+    settled_.record(steady_now_ns() - *std::exchange(unsettled_ns_, std::nullopt));
 }
 
 LiveMeshFigures LiveMesh::figures() const {
   const auto ms = [](std::int64_t ns) { return static_cast<double>(ns) * 1e-6; };
+  const auto most_ms = [&](const LatencyHistogram& of, std::optional<std::int64_t> since_ns) {
+    return ms(std::max(of.max_ns(), since_ns ? steady_now_ns() - *since_ns : 0));
+  };
   LiveMeshFigures figures;
   figures.updates = updates_;
   if (updates_ > 0) {
@@ -103,11 +108,12 @@ LiveMeshFigures LiveMesh::figures() const {
   figures.behind_p50_ms = ms(behind_.quantile_ns(0.5));
   figures.behind_p99_ms = ms(behind_.quantile_ns(0.99));
   figures.behind_max_ms = ms(behind_.max_ns());
-  figures.loops = loops_.count();
-  figures.loop_max_ms = ms(loops_.max_ns());
-  figures.joined_max_ms = ms(joined_.max_ns());
-  figures.settled_max_ms = ms(settled_.max_ns());
-  figures.memory_mb = static_cast<double>(most_bytes_) / (1 << 20);
+  figures.loops = moved_.count();
+  figures.loop_max_ms = ms(moved_.max_ns());
+  figures.joined_max_ms =
+      most_ms(joined_, unjoined_.empty() ? std::nullopt : std::optional(unjoined_.front().published_ns));
+  figures.settled_max_ms = most_ms(settled_, unsettled_ns_);
+  figures.memory_mb = static_cast<double>(std::max(most_bytes_, composition_.bytes())) / (1 << 20);
   return figures;
 }
 

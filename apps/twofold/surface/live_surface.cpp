@@ -20,7 +20,9 @@ namespace twofold {
 namespace {
 
 constexpr std::size_t kMostFrames = 4;  // at a time: a tenth of a second
-constexpr int kMostPutOff = 3;          // steps after which what waits is done, whatever else does
+// From one look at what came to the next, about 30 ms:
+constexpr std::size_t kMostBlocks = 1000;  // made anew
+constexpr std::size_t kMostAnew = 2;       // keyframes of bent submaps, fused anew
 constexpr auto kMapCheck = std::chrono::milliseconds(20);
 
 }  // namespace
@@ -99,7 +101,7 @@ void LiveSurface::listen(EngineOptions& options) {
 void LiveSurface::show(const Frame& frame) {
   if (!surface_) return;
   sort_frames();
-  if (!worker_) step();
+  if (!worker_) (void)step();
   under_way_.push_back(frame);
 }
 
@@ -127,14 +129,15 @@ void LiveSurface::sort_frames() {
 void LiveSurface::work(const std::stop_token& stop) {
   yield_to_other_threads();
   const MakesWay makes_way(right_of_way_);
+  bool any_left = false;
   while (!stop.stop_requested()) {
-    {
+    if (!any_left) {
       std::unique_lock lock(mutex_);
       (void)arrived_.wait_for(lock, stop, kMapCheck, [this] { return !keyframes_.empty(); });
     }
     if (stop.stop_requested()) return;  // the caller takes the rest
     const std::int64_t begin_ns = thread_cpu_ns();
-    step(kMostFrames);
+    any_left = step(kMostFrames);
     const double rest_ns = static_cast<double>(thread_cpu_ns() - begin_ns) * (1 / arguments_.load - 1);
     std::unique_lock lock(mutex_);
     (void)arrived_.wait_for(lock, stop, std::chrono::nanoseconds(std::llround(rest_ns)),
@@ -142,69 +145,37 @@ void LiveSurface::work(const std::stop_token& stop) {
   }
 }
 
-void LiveSurface::step(std::size_t most_frames) {
+bool LiveSurface::step(std::size_t most_frames) {
   Keyframes taken;
   {
     const std::scoped_lock lock(mutex_);
     for (; !keyframes_.empty() && taken.size() < most_frames; keyframes_.pop_front())
       taken.push_back(std::move(keyframes_.front()));
   }
-  const bool moved = maps_.newest()->graph.version() != version_;
-  if (moved || !taken.empty() || surface_->unfinished()) fuse(taken);
-  if (!mesh_ || (something_waits() && ++put_off_ < kMostPutOff)) return;
-  put_off_ = 0;
-  catch_up();
-}
-
-void LiveSurface::fuse(Keyframes& taken) {
-  if (mesh_) follow_map();
   for (auto& [frame, row_offset] : taken) {
     take(frame, row_offset);
-    frame = {};
+    frame = {};  // its images may be let go of
   }
-  if (mesh_ && loop_came()) follow_map();
   const auto map = maps_.newest();
+  const bool is_new = !taken.empty() || map->graph.version() != version_;
   version_ = map->graph.version();
-  surface_->step(map->graph, mesh_ ? SubmapWork{.keyframes = kMostFrames, .anew = 0} : SubmapWork{});
-  if (mesh_) follow_map();
+  if (mesh_) return step_with_mesh(map->graph, is_new);
+  if (is_new || surface_->unfinished()) surface_->step(map->graph);
+  return surface_->unfinished();
 }
 
-bool LiveSurface::something_waits() {
-  const std::scoped_lock lock(mutex_);
-  return !keyframes_.empty() || maps_.newest()->graph.version() != version_;
-}
-
-/// One thing at a time, so that what comes waits for no more: a bent submap is fused anew, or the mesh gets
-/// one where it is now that has moved by little.
-void LiveSurface::catch_up() {
-  if (surface_->bent() > 0)
-    surface_->step(maps_.newest()->graph, {.keyframes = 0, .anew = 1});
-  else if (!mesh_->rejoin_farthest(*surface_))
-    return;
-  follow_map();
-}
-
-/// A loop is in the mesh before more is fused: moved at once, then with the submaps joined anew. Where
-/// another one comes meanwhile, the mesh moves with that, too, and what is begun for the first is given up,
-/// once, unless half of it is done: neither of two waits for more than one and a half times what all takes.
-void LiveSurface::follow_map() {
-  constexpr double kNearlyDone = 0.5;
-  bool may_give_up = true;
-  do {
-    const auto map = maps_.newest();
-    version_ = map->graph.version();
-    surface_->step(map->graph, {.keyframes = 0, .anew = 0});
-    mesh_->follow(*surface_, map->graph);
-    may_give_up = mesh_->update(*surface_, map->graph, [&](double done) {
-      if (!loop_came()) return false;
-      mesh_->follow(*surface_, maps_.newest()->graph);
-      return may_give_up && done < kNearlyDone;
-    });
-  } while (loop_came());
-}
-
-bool LiveSurface::loop_came() {
-  return maps_.newest()->graph.last_change().version > version_;
+/// A little at a time, so that what comes next need not wait: what is new and what a loop moved, then submaps
+/// that are bent, and last what has moved by little, as everything does all the time.
+bool LiveSurface::step_with_mesh(const GraphSnapshot& graph, bool is_new) {
+  if (is_new) surface_->step(graph, {.keyframes = kMostFrames, .anew = 0});
+  if (is_new || mesh_->unfinished()) mesh_->update(*surface_, graph, kMostBlocks);
+  if (mesh_->urgent()) return true;
+  if (surface_->bent() > 0) {
+    surface_->step(graph, {.keyframes = 0, .anew = kMostAnew});
+    mesh_->update(*surface_, graph, 0);
+    return true;
+  }
+  return mesh_->unfinished() || mesh_->rejoin(*surface_);
 }
 
 void LiveSurface::take(const Frame& frame, double row_offset) {
@@ -229,7 +200,7 @@ TriangleMesh LiveSurface::finish(const GraphSnapshot& graph, KeyframeId part, Su
     if (!ended) throw std::runtime_error(ended.error());
   }
   sort_frames();
-  step();
+  (void)step();
   if (mesh_) figures.live_mesh = mesh_->figures();
   surface_->step(graph);
   mesh_.reset();  // gives its memory to the whole

@@ -77,23 +77,15 @@ class LiveSurface {
   void sort_frames();
   void work(const std::stop_token& stop);
   /// Takes the oldest of the frames that wait, and the newest map.
-  void step(std::size_t most_frames = kMostWaiting);
-  /// New keyframes first; with a mesh, what has waited longer is left to catch_up. Lets go of the images.
-  void fuse(Keyframes& taken);
-  void catch_up();
-  /// A keyframe's images, or a map that was not looked at.
-  [[nodiscard]] bool something_waits();
-  /// Submaps and mesh as the newest map has them.
-  void follow_map();
-  /// All poses were corrected since the map that submaps and mesh follow.
-  [[nodiscard]] bool loop_came();
+  /// @return  whether anything is left to do in it
+  bool step(std::size_t most_frames = kMostWaiting);
+  bool step_with_mesh(const GraphSnapshot& graph, bool is_new);
   void take(const Frame& frame, double row_offset);
 
   const LiveSurfaceArguments arguments_;
   Rig rig_;
   std::optional<SubmapSurface> surface_;  // the surface's thread's
   std::uint64_t version_ = 0;             // likewise: of the map it saw last
-  int put_off_ = 0;                       // likewise: steps that left no time for catch_up
   FrameColours colours_;                  // likewise
   DepthOutOfRange out_of_range_;          // likewise
   std::string defect_;                    // likewise: of the newest image that did not fit

@@ -25,8 +25,8 @@ struct LiveMeshFigures {
   double behind_p99_ms = 0, behind_max_ms = 0;
   std::uint64_t loops = 0;    ///< versions with a correction of all poses: loops, pose graph
   double loop_max_ms = 0;     ///< until the mesh had moved with the submaps, the slowest
-  double joined_max_ms = 0;   ///< until the moved submaps had been joined anew
-  double settled_max_ms = 0;  ///< likewise until all submaps that were bent had been fused anew
+  double joined_max_ms = 0;   ///< until submaps that moved by more than two voxels had been joined anew
+  double settled_max_ms = 0;  ///< likewise until all submaps that were bent were in the mesh as fused anew
   double memory_mb = 0;       ///< of the joined samples and the mesh, at most [MiB]
 };
 
