@@ -8,11 +8,13 @@
 
 namespace twofold {
 
-/// Bundle adjustment of one anchor frame of one camera and a few others that see its points, all of them: the
-/// start of a monocular filter (thesis 4.5.3). Unknown are the points, inverse depth in the anchor frame, and
-/// the other frames' poses; what the anchor frame itself knows of each point is its prior. The scale is free.
+/// Bundle adjustment of one anchor frame of one camera and a few others, each of which sees all its points:
+/// the start of a monocular filter (thesis 4.5.3). Unknown are the points, inverse depth in the anchor frame,
+/// and the other frames' poses; what the anchor frame itself knows of each point is its prior. The scale is
+/// free.
 ///
-/// Points are eliminated four at a time (thesis 3.3.5), so that a step costs O(N).
+/// Points are eliminated (thesis 3.3.5), so that a step costs O(N) of N points; the arithmetic takes four at
+/// a time.
 struct AnchoredViews {
   struct Point {
     Vector3 psi;        ///< present estimate

@@ -42,9 +42,11 @@ class BatchedViews {
 
   /// The state's cost must be finite.
   void linearise(const AnchoredState& state);
+  /// Of what was linearised last, before a step has used it up.
   [[nodiscard]] Eigen::MatrixXd information() const;
   /// The step with H + damping (diag H + I): multiplicative, plus a floor for depths nobody has measured yet
-  /// and for the scale. Uses up what was linearised. False when there is none.
+  /// and for the scale. Uses up what was linearised. False when the equations have
+  /// no solution.
   [[nodiscard]] bool step(double damping, const AnchoredState& from, AnchoredState& to);
 
  private:

@@ -76,7 +76,7 @@ struct VerificationReport {
 ///
 /// @param a      the place's own view
 /// @param place  asked for once a and b have proposed a pose, which most wrong places do not come to: a
-///               again, with T_v_a = identity; then, if there are, its neighbours'
+///               again, with T_v_a = identity, then the views of its neighbours, if it has any
 [[nodiscard]] std::optional<VerifiedPlace> verify_place(
     const Rig& rig, const PlaceAppearance& a, const std::function<std::span<const PlacedView>()>& place,
     const PlaceAppearance& b, const VerificationOptions& options, VerificationReport* report = nullptr);

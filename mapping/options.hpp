@@ -100,8 +100,8 @@ struct MapperOptions {
   WindowSolverOptions solver;  ///< joint optimisation of eq. 6.4
   /// With one camera solver.relative_decrease is at least this, >= 0. Of thousands of measurements, a step
   /// that gains so little of the cost moves the window by less than their noise does, the next one gains a
-  /// hundredth of that, and the next keyframe's round goes on from there. With a rig, whose frames may be far
-  /// apart, it does not always.
+  /// tenth or a hundredth of that, and the next keyframe's round goes on from there. A rig's frames may be so
+  /// far apart that this round would begin too far off.
   double one_camera_decrease = 3e-4;
   int structure_iterations = 2;        ///< structure-only, after poses were set along edges, >= 0
   double outlier_chi2_mono = 10.6;     ///< 99.5 % of chi-square with 2 degrees of freedom, > 0

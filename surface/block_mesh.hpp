@@ -61,9 +61,9 @@ struct VertexPlace {
   friend bool operator==(const VertexPlace&, const VertexPlace&) = default;
 };
 
-/// What is to become of a block's samples before long: a piece stays as it is until then, but for triangles
-/// that end where a neighbour has no vertex any more. Neighbours of a block that is to hold something else
-/// altogether have no triangles that end in it.
+/// What is still to be done to a block's samples. Its piece stays as it is until then, but for triangles that
+/// end where a neighbour has no vertex any more. kChanges: they will differ a little. kOthers: they belong
+/// elsewhere; neighbours whose pieces are made before have no triangles that end in them.
 enum class Pending : std::uint8_t { kNothing, kChanges, kOthers };
 
 /// A block's piece of the mesh: the vertices between its samples and the next ones along each axis, in the
@@ -104,7 +104,7 @@ class BlockMesher {
   [[nodiscard]] const Row& row(int y, int z) const { return rows_[static_cast<std::size_t>(z * kRows + y)]; }
   /// Whether there is anything to be made of the block, as far as a glance tells.
   [[nodiscard]] bool find_blocks(const BlockPosition& at);
-  /// Unless it is to hold others' samples.
+  /// Number of the block there; nothing if there is none, or if its samples belong elsewhere.
   [[nodiscard]] std::optional<std::uint32_t> neighbour(const BlockPosition& at) const;
   void fill();
   void fill_row(int y, int z, std::size_t to);

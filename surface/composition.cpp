@@ -1,6 +1,7 @@
 #include "surface/composition.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "base/right_of_way.hpp"
 
@@ -22,13 +23,21 @@ std::size_t Composition::settle(std::span<const PlacedVolume> volumes) {
   return update(volumes);
 }
 
+bool Composition::rejoin(std::span<const PlacedVolume> volumes) {
+  if (!rejoin(volumes, kRest, true)) return false;
+  for (const PlacedVolume& volume : volumes) take_changes(volume);
+  mark_left();
+  return true;
+}
+
 bool Composition::rejoin(std::span<const PlacedVolume> volumes, double rest, bool mesh_moves) {
   Steps steps;
   std::vector<const PlacedVolume*> moved;
   for (const PlacedVolume& volume : volumes) {
     const auto found = members_.find(volume.id);
     if (found == members_.end()) continue;
-    const Member& member = found->second;
+    Member& member = found->second;
+    extend_bounds(member, *volume.volume);
     Step& step = steps[volume.id];
     step = {volume.volume, member.T_w_v.inverse()};
     if (!has_moved(member, volume.T_w_v, rest)) continue;
@@ -95,10 +104,12 @@ bool Composition::has_surface(const SurfaceVolume& volume, const Vector3& x_v) {
 }
 
 /// Blocks are never taken out of a volume one by one: where moved volumes have left more than they are in,
-/// all are made anew.
+/// all are made anew. Not before those are that wait, if that comes before long.
 void Composition::let_go_of_empty_blocks() {
   constexpr std::size_t kFew = 1000;
-  if (empty_blocks_ < std::max(kFew, whole_.blocks().size() / 2)) return;
+  const std::size_t many = unfinished() ? whole_.blocks().size() / 4 * 3 : whole_.blocks().size() / 2;
+  if (empty_blocks_ < std::max(kFew, many)) return;
+  for (std::size_t q = 0; q < queues_.size(); ++q) made_[q] += queues_[q].size();
   whole_.clear();
   reached_.clear();
   marks_.clear();
@@ -164,12 +175,12 @@ void Composition::take_changes(const PlacedVolume& placed) {
     join(placed.id, member, block.at, block.revision > known ? kNew : member.mark_as);
     make_way();
   }
+  extend_bounds(member, volume);
   member.revision = volume.revision();
   member.joined = true;
 }
 
 void Composition::join(std::uint32_t id, Member& member, const BlockPosition& block, Mark mark_as) {
-  extend_bounds(member, block);
   for (const std::uint32_t reached : whole_.add_overlapped(block, member.T_w_v)) {
     if (reached >= reached_.size()) {
       empty_blocks_ += reached + 1 - reached_.size();
@@ -187,15 +198,24 @@ void Composition::join(std::uint32_t id, Member& member, const BlockPosition& bl
   }
 }
 
-void Composition::extend_bounds(Member& member, const BlockPosition& block) const {
+/// By the blocks that changed since it was added.
+void Composition::extend_bounds(Member& member, const SurfaceVolume& volume) const {
+  if (volume.revision() == member.revision) return;
   const double edge = kBlockEdge * whole_.options().voxel;
-  const Vector3 corner = edge * Vector3(block.x, block.y, block.z);
-  member.low = member.low.cwiseMin(corner);
-  member.high = member.high.cwiseMax(corner + Vector3::Constant(edge));
+  for (std::size_t b = 0; b < volume.blocks().size(); ++b) {
+    const BlockHead& block = volume.blocks().head(b);
+    if (block.revision <= member.revision) continue;
+    const Vector3 corner = edge * Vector3(block.at.x, block.at.y, block.at.z);
+    member.low = member.low.cwiseMin(corner);
+    member.high = member.high.cwiseMax(corner + Vector3::Constant(edge));
+  }
 }
 
 void Composition::mark(std::uint32_t block, std::uint32_t changed, Mark as) {
-  reached_[block].first_changed = std::min(reached_[block].first_changed, changed);
+  Reached& reached = reached_[block];
+  reached.first_changed = std::min(reached.first_changed, changed);
+  if (as == kSoon && !std::exchange(reached.is_elsewhere, true) && marks_[block] == kNew)
+    queues_[as].push_back(block);  // counted in both
   if (marks_[block] >= as) return;
   marks_[block] = as;
   queues_[as].push_back(block);
@@ -203,9 +223,9 @@ void Composition::mark(std::uint32_t block, std::uint32_t changed, Mark as) {
 
 std::vector<Pending> Composition::pending() const {
   std::vector<Pending> of_blocks(marks_.size());
-  std::transform(marks_.begin(), marks_.end(), of_blocks.begin(), [](Mark mark) {
-    return mark == kNone ? Pending::kNothing : mark == kSoon ? Pending::kOthers : Pending::kChanges;
-  });
+  for (std::size_t b = 0; b < marks_.size(); ++b) {
+    if (marks_[b] != kNone) of_blocks[b] = reached_[b].is_elsewhere ? Pending::kOthers : Pending::kChanges;
+  }
   return of_blocks;
 }
 
@@ -215,11 +235,6 @@ bool Composition::unfinished() const {
 }
 
 std::size_t Composition::compose(std::span<const PlacedVolume> volumes, std::size_t most) {
-  constexpr std::size_t kMostBegun = 10000;  // 40 MB, with colours
-  if (begun_.size() > kMostBegun) {
-    begun_.clear();
-    for (Reached& reached : reached_) reached.begun_before = 0;
-  }
   Resamplers resamplers;
   for (const PlacedVolume& volume : volumes)
     resamplers.try_emplace(volume.id, *volume.volume, members_.at(volume.id).T_w_v.inverse());
@@ -227,19 +242,25 @@ std::size_t Composition::compose(std::span<const PlacedVolume> volumes, std::siz
   const auto make_some = [&](Mark marked_as, std::size_t up_to) {
     std::deque<std::uint32_t>& queue = queues_[marked_as];
     for (; !queue.empty() && made < up_to; queue.pop_front(), ++made_[marked_as]) {
-      if (marks_[queue.front()] != marked_as) continue;
+      if (marks_[queue.front()] < marked_as) continue;  // made since
       make(queue.front(), marked_as, resamplers);
       ++made;
       make_way();
     }
   };
-  make_some(kNew, queues_[kSoon].empty() ? most : most / 2);  // neither waits for all of the other
+  make_some(kLater, most / 16);  // nothing waits for all of something else
+  make_some(kNew, queues_[kSoon].empty() ? most : most / 2);
   for (const Mark next : {kSoon, kNew, kLater}) make_some(next, most);
   return made;
 }
 
 void Composition::make(std::uint32_t block, Mark marked_as, Resamplers& resamplers) {
   constexpr std::size_t kWorthIt = 2;
+  constexpr std::size_t kMostBegun = 10000;  // 40 MB, with colours
+  if (begun_.size() > kMostBegun) {
+    begun_.clear();
+    for (Reached& any : reached_) any.begun_before = 0;
+  }
   Reached& reached = reached_[block];
   std::vector<Resampler*> all;
   for (const std::uint32_t id : reached.volumes) all.push_back(&resamplers.at(id));
@@ -257,6 +278,7 @@ void Composition::make(std::uint32_t block, Mark marked_as, Resamplers& resample
   const VoxelBlock* from = begun > 0 ? begun_.find(whole_.blocks().head(block).at) : nullptr;
   whole_.compose_block(block, from, std::span(all).subspan(begun));
   reached.first_changed = kNoVolume;
+  reached.is_elsewhere = false;
   marks_[block] = kNone;
 }
 

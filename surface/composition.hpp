@@ -34,8 +34,9 @@ class Composition {
  public:
   static constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
 
-  /// @param rest  [voxels] a volume that has moved by no more than this stays where it was, in an update and
-  ///              in the mesh, because poses never rest while the map grows
+  /// @param rest  [voxels] an update leaves a volume where it was that has moved by no more than this,
+  /// because
+  ///              poses never rest while the map grows; rejoin and settle move it nevertheless
   explicit Composition(const SurfaceOptions& options, double rest = kRest) : whole_(options), rest_(rest) {}
 
   /// The volumes there are now, ascending by id.
@@ -48,9 +49,9 @@ class Composition {
   /// The mesh moves with those volumes that have moved by more than half a voxel, and their blocks wait for
   /// the next updates.
   /// @return  whether there are any
-  bool rejoin(std::span<const PlacedVolume> volumes) { return rejoin(volumes, kRest, true); }
+  bool rejoin(std::span<const PlacedVolume> volumes);
 
-  /// How many blocks were ever marked to be made anew, and how many of them are, in the same order.
+  /// How many blocks have ever begun to wait, and how many of these are made anew, first in, first out.
   struct Progress {
     std::uint64_t marked = 0, made = 0;
   };
@@ -68,8 +69,8 @@ class Composition {
  private:
   static constexpr double kRest = 0.5;  // [voxels]
   static constexpr std::uint32_t kNoVolume = std::numeric_limits<std::uint32_t>::max();
-  /// Why a block is to be made anew: it moved by little, or was fused anew; it moved by more; there is
-  /// something new.
+  /// Why a block is to be made anew: one of its volumes moved by no more than may rest, was fused anew or is
+  /// gone; one moved farther, or all blocks begin anew; one has something new there.
   enum Mark : std::uint8_t { kNone, kLater, kSoon, kNew };
   struct Member {
     SE3 T_w_v;                                            ///< where it was added
@@ -85,9 +86,10 @@ class Composition {
   struct Reached {
     std::vector<std::uint32_t> volumes;       ///< that reach into it: ids, ascending
     std::uint32_t first_changed = kNoVolume;  ///< since it was made
-    /// What the volumes before this one say of it is in begun_. So that what a camera looks at costs no more
-    /// the more volumes see it, too.
+    /// What volumes with smaller ids than this one say of it is in begun_; 0: nothing is. So a block that a
+    /// camera keeps looking at costs no more with each further volume that sees it.
     std::uint32_t begun_before = 0;
+    bool is_elsewhere = false;  ///< what it holds has moved by more than may rest, or some of it
   };
   struct Left {
     std::uint32_t block = 0, volume = 0;
@@ -111,7 +113,7 @@ class Composition {
   void take_changes(const PlacedVolume& volume);
   void join(std::uint32_t id, Member& member, const BlockPosition& block, Mark mark_as);
   void leave(std::uint32_t id, Member& member, Mark mark_as);
-  void extend_bounds(Member& member, const BlockPosition& block) const;
+  void extend_bounds(Member& member, const SurfaceVolume& volume) const;
   void mark_left();
   void mark(std::uint32_t block, std::uint32_t changed, Mark as);
   [[nodiscard]] Progress progress(Mark of) const { return {made_[of] + queues_[of].size(), made_[of]}; }

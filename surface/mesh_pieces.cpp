@@ -115,6 +115,7 @@ std::size_t MeshPieces::update(const SurfaceVolume& volume, std::span<const Pend
 
 void MeshPieces::move(const std::function<Motion(const Vector3&)>& motion_of) {
   ++revision_;
+  std::vector<BlockPosition> moved;
   for (auto& [at, piece] : pieces_) {
     if (piece.mesh.vertices.empty()) continue;
     make_way();
@@ -126,11 +127,13 @@ void MeshPieces::move(const std::function<Motion(const Vector3&)>& motion_of) {
       vertex.position = turn * vertex.position + shift;
       vertex.normal = (turn * vertex.normal).normalized();
     }
-    moved_.push_back(at);
+    moved.push_back(at);
   }
+  for (const BlockPosition& at : moved) touch(at);
+  if (moved.empty()) --revision_;
+  moved_.insert(moved_.end(), moved.begin(), moved.end());
   std::sort(moved_.begin(), moved_.end());
   moved_.erase(std::unique(moved_.begin(), moved_.end()), moved_.end());
-  for (const BlockPosition& at : moved_) touch(at);
 }
 
 /// A piece has changed: triangles of the blocks before it end in its vertices.

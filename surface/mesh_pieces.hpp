@@ -30,7 +30,7 @@ class MeshPieces {
   /// @param motion_of  a piece's, asked for one of its vertices
   void move(const std::function<Motion(const Vector3&)>& motion_of);
 
-  /// Counts the calls that changed a piece; 0: there is none yet.
+  /// Counts the calls that changed or moved a piece; 0: there was none yet.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
   /// Blocks whose piece changed after that revision, ascending; also those that have none any
   /// more, unless it is 0: there was nothing before.
@@ -56,7 +56,8 @@ class MeshPieces {
   [[nodiscard]] Behind behind(const BlockPosition& at) const;
   /// Whether a triangle's vertices are there still, though neighbours may have been made anew alone.
   [[nodiscard]] static bool has_all(const Behind& blocks, const std::array<VertexPlace, 3>& triangle);
-  /// Which of the volume's blocks have a piece that rests on samples that changed.
+  /// Which of the volume's blocks need their piece made anew: samples that it rests on have changed, or it
+  /// was moved. Those that are pending are left to a later update.
   [[nodiscard]] std::vector<std::uint32_t> outdated(const SurfaceVolume& volume,
                                                     std::span<const Pending> pending);
   void touch(const BlockPosition& at);

@@ -168,7 +168,7 @@ void SubmapSurface::take_new_keyframes(const GraphSnapshot& graph, std::size_t m
 }
 
 void SubmapSurface::add_keyframe(const GraphSnapshot& graph, const Keyframe& keyframe, Waiting frame) {
-  if (static_cast<double>(bytes()) > limits_.memory_mb * (1 << 20)) {
+  if (static_cast<double>(bytes() - bytes_anew()) > limits_.memory_mb * (1 << 20)) {
     ++report_.beyond_memory;
     return;
   }
@@ -271,16 +271,6 @@ std::vector<PlacedVolume> SubmapSurface::placed(KeyframeId part) const {
   return volumes;
 }
 
-std::vector<PlacedVolume> SubmapSurface::placed_in(const GraphSnapshot& graph, KeyframeId part) const {
-  std::vector<PlacedVolume> volumes;
-  for (const auto& submap : submaps_) {
-    const Keyframe& hung_on = graph.keyframe(submap->hung_on);
-    if (hung_on.part == part && !hung_on.culled())
-      volumes.push_back({submap->id, submap->content.volume.get(), hung_on.T_k_w.inverse() * submap->T_k_s});
-  }
-  return volumes;
-}
-
 std::vector<SharedSubmap> SubmapSurface::share() {
   std::vector<SharedSubmap> shared;
   for (const auto& submap : submaps_) {
@@ -291,12 +281,19 @@ std::vector<SharedSubmap> SubmapSurface::share() {
   return shared;
 }
 
-std::size_t SubmapSurface::bytes() const {
+std::size_t SubmapSurface::bytes_anew() const {
   std::size_t sum = 0;
+  for (const auto& submap : submaps_)
+    if (submap->anew) sum += submap->anew->bytes();
+  return sum;
+}
+
+std::size_t SubmapSurface::bytes() const {
+  std::size_t sum = bytes_anew();
   for (const Waiting& frame : waiting_)
     sum += bytes_of(frame.packed) + bytes_of(frame.images.depth) + bytes_of(frame.images.colour);
   for (const auto& submap : submaps_) {
-    sum += submap->content.bytes() + (submap->anew ? submap->anew->bytes() : 0);
+    sum += submap->content.bytes();
     for (const Member& member : submap->members) sum += bytes_of(member.packed);
   }
   return sum;

@@ -19,7 +19,8 @@ namespace twofold {
 
 struct SubmapOptions {
   int max_keyframes = 10;        ///< of a submap >= 1
-  std::size_t max_waiting = 64;  ///< depth images that wait for their keyframes, or to be fused >= 1
+  std::size_t max_waiting = 64;  ///< depth images that wait for their keyframes or to be fused, and keyframes
+                                 ///< that wait for their depth >= 1
   /// Of samples and depth images [MiB] > 0: with more than this no keyframe is added, and its depth is let go
   /// of. What is fused anew may exceed it.
   double memory_mb = 2000;
@@ -100,17 +101,18 @@ class SubmapSurface {
   void step(const GraphSnapshot& graph, const SubmapWork& work = {});
   /// Submaps that are bent and wait to be fused anew.
   [[nodiscard]] std::size_t bent() const { return bent_; }
-  /// Keyframes of the last step's map whose depth is not fused yet, be it that it has not come.
+  /// Of the newest keyframes of the last step's map (max_waiting of them), those whose depth is not fused
+  /// yet, or has not come.
   [[nodiscard]] std::size_t unfused() const { return without_depth_.size(); }
+  /// Whether the last step could have fused more new keyframes.
+  [[nodiscard]] bool keyframes_left() const { return keyframes_left_; }
   /// Whether the last step left anything to do in the map it had.
-  [[nodiscard]] bool unfinished() const { return bent_ > 0 || keyframes_left_; }
+  [[nodiscard]] bool unfinished() const { return bent() > 0 || keyframes_left(); }
 
   /// All submaps of a map part in its world frame, as it was in the last step, added into one.
   [[nodiscard]] SurfaceVolume whole(KeyframeId part) const;
   /// These submaps, as Composition takes them; valid until the next step.
   [[nodiscard]] std::vector<PlacedVolume> placed(KeyframeId part) const;
-  /// The same, but where a newer map than that of the last step has them.
-  [[nodiscard]] std::vector<PlacedVolume> placed_in(const GraphSnapshot& graph, KeyframeId part) const;
 
   /// The submaps of all map parts for whoever asks about them later, on any thread: takes no time, and each
   /// is copied before it changes.
@@ -167,6 +169,7 @@ class SubmapSurface {
   /// @return  keyframes fused
   std::size_t fuse_anew(Submap& submap, std::size_t most);
   [[nodiscard]] double bend_of(const Submap& submap) const;
+  [[nodiscard]] std::size_t bytes_anew() const;
   /// False for an image without readings, of which nothing becomes.
   /// @param images  empty: those that the member has packed
   bool fuse(Submap::Content& into, const Member& member, const SE3& T_k_s, DepthImages images);

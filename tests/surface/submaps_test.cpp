@@ -77,17 +77,9 @@ TEST_F(SubmapSurfaceTest, ALoopMovesSubmapsWithoutFusingAnew) {
   const SE3 T_new_old(SO3::exp(Vector3(0.1, 0.2, -0.1)), Vector3(0.3, -0.2, 0.5));
   for (std::uint32_t k = 0; k < kKeyframes; ++k)
     writer_.set_pose(KeyframeId{k}, writer_.graph().keyframe(KeyframeId{k}).T_k_w * T_new_old.inverse());
-  const GraphSnapshot& graph = writer_.publish();
-  const std::vector<PlacedVolume> ahead = surface.placed_in(graph, KeyframeId{0});
-  surface.step(graph);
+  surface.step(writer_.publish());
   EXPECT_EQ(surface.report().fused_anew, 0);
   EXPECT_LT(error(surface, T_new_old), 0.002);
-  const std::vector<PlacedVolume> then = surface.placed(KeyframeId{0});
-  ASSERT_EQ(ahead.size(), then.size());
-  for (std::size_t n = 0; n < then.size(); ++n) {
-    EXPECT_EQ(ahead[n].id, then[n].id);
-    EXPECT_TRUE(ahead[n].T_w_v.matrix().isApprox(then[n].T_w_v.matrix(), 1e-12));
-  }
 }
 
 TEST_F(SubmapSurfaceTest, SubmapsBeginOnTheWorldsGrid) {

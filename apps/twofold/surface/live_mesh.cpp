@@ -17,9 +17,9 @@ void LiveMesh::published(const GraphSnapshot& graph) {
 
 void LiveMesh::update(const SubmapSurface& surface, const GraphSnapshot& graph, std::size_t most) {
   if (graph.reference() == kNoKeyframe) return;
-  part_ = graph.part(graph.reference());
+  if (const KeyframeId part = graph.part(graph.reference()); part != part_) begin(part);
   const std::int64_t begin_ns = thread_cpu_ns();
-  follow_correction(surface, graph);
+  follow_change(surface, graph);
   const std::size_t blocks = composition_.update(surface.placed(part_), most);
   if (blocks > 0) {
     ++updates_;
@@ -33,9 +33,17 @@ void LiveMesh::update(const SubmapSurface& surface, const GraphSnapshot& graph, 
   if (blocks > 0 && !unfinished()) most_bytes_ = std::max(most_bytes_, composition_.bytes());
 }
 
-void LiveMesh::follow_correction(const SubmapSurface& surface, const GraphSnapshot& graph) {
-  if (graph.last_change().version <= corrected_) return;
-  corrected_ = graph.last_change().version;
+void LiveMesh::begin(KeyframeId part) {
+  part_ = part;
+  composition_ = Composition(composition_.whole().options(), kAtOnce);
+  revision_ = 0;
+  for (MapTime& time : map_times_) time.made_until.reset();
+  for (Change& change : unjoined_) change.made_until.reset();
+}
+
+void LiveMesh::follow_change(const SubmapSurface& surface, const GraphSnapshot& graph) {
+  if (graph.last_change().version <= followed_) return;
+  followed_ = graph.last_change().version;
   (void)rejoin(surface);
   tell();
   read_times();
@@ -81,8 +89,8 @@ void LiveMesh::take_times(const SubmapSurface& surface, std::uint64_t version) {
 
 void LiveMesh::take_joined() {
   const auto [marked, made] = composition_.of_moved();
-  for (Correction& correction : unjoined_)
-    if (!correction.made_until) correction.made_until = marked;
+  for (Change& change : unjoined_)
+    if (!change.made_until) change.made_until = marked;
   for (; !unjoined_.empty() && *unjoined_.front().made_until <= made; unjoined_.pop_front())
     joined_.record(steady_now_ns() - unjoined_.front().published_ns);
 }
@@ -107,7 +115,8 @@ LiveMeshFigures LiveMesh::figures() const {
   figures.maps = behind_.count();
   figures.behind_p50_ms = ms(behind_.quantile_ns(0.5));
   figures.behind_p99_ms = ms(behind_.quantile_ns(0.99));
-  figures.behind_max_ms = ms(behind_.max_ns());
+  figures.behind_max_ms =
+      most_ms(behind_, map_times_.empty() ? std::nullopt : std::optional(map_times_.front().published_ns));
   figures.loops = moved_.count();
   figures.loop_max_ms = ms(moved_.max_ns());
   figures.joined_max_ms =

@@ -19,8 +19,9 @@ namespace twofold {
 struct MapTime {
   std::uint64_t version = 0;
   std::int64_t published_ns = 0;
-  bool changed = false;  ///< all poses were corrected: a loop, or the pose graph
-  /// Composition::of_new when what is new in it is in the mesh; nothing: it was not looked at.
+  bool changed = false;  ///< a map change came with it: a loop, the pose graph, joined parts
+  /// Composition::of_new().made when all that is new in it is in the mesh; nothing: depth of its keyframes is
+  /// missing.
   std::optional<std::uint64_t> made_until = {};
 };
 
@@ -28,8 +29,7 @@ struct MapTime {
 /// far it is behind the map: from when a version is published until the depth of all its keyframes is in the
 /// mesh, and the mesh of what moved by more than kAtOnce has moved.
 ///
-/// A correction of all poses moves the mesh at once; then the blocks of what moved are made anew, a few with
-/// each update.
+/// A map change moves the mesh at once; then the blocks of what moved are made anew, some with each update.
 class LiveMesh {
  public:
   /// Told of the mesh each time it changed, on the thread that calls update.
@@ -50,23 +50,26 @@ class LiveMesh {
   bool rejoin(const SubmapSurface& surface);
   /// Whether blocks wait for updates.
   [[nodiscard]] bool unfinished() const { return composition_.unfinished(); }
-  /// Of these, such as hold something new, or have moved by more than kAtOnce.
+  /// Whether any of them holds something new, or is of a submap that moved by more than kAtOnce.
   [[nodiscard]] bool urgent() const;
   /// After the run.
   [[nodiscard]] LiveMeshFigures figures() const;
 
  private:
-  /// [voxels] What moves farther is in the mesh before the map's version counts as being so. Two images of a
-  /// wall that are this far apart are still averaged into one, not two walls.
+  /// [voxels] The mesh has moved with what moved farther before it counts as that of the map's version. Two
+  /// copies of a wall that are this far apart are still averaged into one.
   static constexpr double kAtOnce = 2;
 
-  struct Correction {
+  struct Change {
     std::int64_t published_ns = 0;
-    std::optional<std::uint64_t> made_until;  ///< Composition::of_moved when what it moved is joined anew
+    std::optional<std::uint64_t>
+        made_until;  ///< Composition::of_moved().made when what it moved is joined anew
   };
 
-  /// If all poses were corrected since the last update.
-  void follow_correction(const SubmapSurface& surface, const GraphSnapshot& graph);
+  /// Of another part: nothing of the one before is left.
+  void begin(KeyframeId part);
+  /// If all poses were moved since the last update.
+  void follow_change(const SubmapSurface& surface, const GraphSnapshot& graph);
   void tell();
   void read_times();
   void take_times(const SubmapSurface& surface, std::uint64_t version);
@@ -79,11 +82,11 @@ class LiveMesh {
   std::uint64_t revision_ = 0;     // that the listener knows
   SpscRing<MapTime> times_{4096};  // mapper -> surface
   std::uint64_t last_change_ = 0;  // mapper's
-  std::uint64_t corrected_ = 0;    // version of the last correction that the mesh has followed
+  std::uint64_t followed_ = 0;     // version of the last map change that the mesh has followed
   std::deque<MapTime> map_times_;  // of maps that the mesh is not of yet
   LatencyHistogram behind_, moved_, joined_, settled_;
-  std::deque<Correction> unjoined_;           // by more than kAtOnce
-  std::optional<std::int64_t> unsettled_ns_;  // since when what a correction bent may wait
+  std::deque<Change> unjoined_;               // by more than kAtOnce
+  std::optional<std::int64_t> unsettled_ns_;  // since when what a map change bent may wait
   std::int64_t updates_ = 0, cpu_ns_ = 0;
   std::size_t blocks_ = 0, most_bytes_ = 0;
 };

@@ -23,6 +23,7 @@ constexpr std::size_t kMostFrames = 4;  // at a time: a tenth of a second
 // From one look at what came to the next, about 30 ms:
 constexpr std::size_t kMostBlocks = 1000;  // made anew
 constexpr std::size_t kMostAnew = 2;       // keyframes of bent submaps, fused anew
+constexpr int kMostPutOff = 10;            // looks after which these get a turn, whatever else waits
 constexpr auto kMapCheck = std::chrono::milliseconds(20);
 
 }  // namespace
@@ -167,15 +168,17 @@ bool LiveSurface::step(std::size_t most_frames) {
 /// A little at a time, so that what comes next need not wait: what is new and what a loop moved, then submaps
 /// that are bent, and last what has moved by little, as everything does all the time.
 bool LiveSurface::step_with_mesh(const GraphSnapshot& graph, bool is_new) {
-  if (is_new) surface_->step(graph, {.keyframes = kMostFrames, .anew = 0});
-  if (is_new || mesh_->unfinished()) mesh_->update(*surface_, graph, kMostBlocks);
-  if (mesh_->urgent()) return true;
+  const bool any_new = is_new || surface_->keyframes_left();
+  if (any_new) surface_->step(graph, {.keyframes = kMostFrames, .anew = 0});
+  if (any_new || mesh_->unfinished()) mesh_->update(*surface_, graph, kMostBlocks);
+  if ((surface_->keyframes_left() || mesh_->urgent()) && ++put_off_ < kMostPutOff) return true;
+  put_off_ = 0;
   if (surface_->bent() > 0) {
     surface_->step(graph, {.keyframes = 0, .anew = kMostAnew});
     mesh_->update(*surface_, graph, 0);
     return true;
   }
-  return mesh_->unfinished() || mesh_->rejoin(*surface_);
+  return surface_->keyframes_left() || mesh_->unfinished() || mesh_->rejoin(*surface_);
 }
 
 void LiveSurface::take(const Frame& frame, double row_offset) {
@@ -203,7 +206,8 @@ TriangleMesh LiveSurface::finish(const GraphSnapshot& graph, KeyframeId part, Su
   (void)step();
   if (mesh_) figures.live_mesh = mesh_->figures();
   surface_->step(graph);
-  mesh_.reset();  // gives its memory to the whole
+  if (mesh_) mesh_->update(*surface_, graph, Composition::kAll);  // whoever is shown it keeps it
+  mesh_.reset();                                                  // gives its memory to the whole
   const SurfaceVolume whole = surface_->whole(part);
   const std::int64_t begin_ns = thread_cpu_ns();
   TriangleMesh mesh = extract_mesh(whole);

@@ -53,7 +53,7 @@ class LiveSurface {
  public:
   /// Adds its listeners to those of `options`, which are called as before, and takes its right_of_way, which
   /// must be null. source must outlive the object, and the object the run.
-  /// Throws IoError for a source without depth or options out of their ranges.
+  /// Throws IoError for a source without depth, a voxel out of its range, or mesh files that have no folder.
   /// @param one_thread  the run is deterministic, or a replay
   /// @param on_mesh     asks for a mesh while the run lasts, on more than one thread; may be empty
   LiveSurface(const LiveSurfaceArguments& arguments, const FrameSource& source, EngineOptions& options,
@@ -62,8 +62,9 @@ class LiveSurface {
   /// The reader's thread, with each frame it reads.
   void show(const Frame& frame);
 
-  /// Once, after the run, if wanted(): fuses what still waits, into the final map, and extracts the mesh of
-  /// map part `part`. Throws what the surface's thread failed of.
+  /// Once, after the run, if wanted(): fuses what still waits, and anew what is bent, along the final map's
+  /// poses, and extracts the mesh of map part `part`. Throws std::runtime_error with what the surface's
+  /// thread failed of.
   [[nodiscard]] TriangleMesh finish(const GraphSnapshot& graph, KeyframeId part, SurfaceFigures& figures);
   [[nodiscard]] bool wanted() const { return surface_.has_value(); }
 
@@ -86,6 +87,7 @@ class LiveSurface {
   Rig rig_;
   std::optional<SubmapSurface> surface_;  // the surface's thread's
   std::uint64_t version_ = 0;             // likewise: of the map it saw last
+  int put_off_ = 0;                       // likewise: steps that left no time for bent submaps
   FrameColours colours_;                  // likewise
   DepthOutOfRange out_of_range_;          // likewise
   std::string defect_;                    // likewise: of the newest image that did not fit

@@ -79,7 +79,7 @@ void print_surface(const SurfaceFigures& f) {
         m.memory_mb);
     if (m.loops > 0)
       fmt::print(
-          "            {} corrections of all poses (loops, pose graph) in the mesh after {:.0f} ms at most;\n"
+          "            {} map changes (loops, pose graph) in the mesh after {:.0f} ms at most;\n"
           "            joined anew after {:.0f} ms, what they bent fused anew after {:.0f} ms\n",
           m.loops, m.loop_max_ms, m.joined_max_ms, m.settled_max_ms);
   }

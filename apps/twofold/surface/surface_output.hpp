@@ -15,7 +15,7 @@
 namespace twofold {
 
 /// What keeping the mesh up to date while a run lasts took. A version of the map is in the mesh when the
-/// depth of its keyframes is.
+/// depth of its keyframes is, and the mesh has moved with what moved by more than two voxels.
 struct LiveMeshFigures {
   std::int64_t updates = 0;     ///< that made blocks anew
   double blocks_an_update = 0;  ///< mean
@@ -25,7 +25,8 @@ struct LiveMeshFigures {
   double behind_p99_ms = 0, behind_max_ms = 0;
   std::uint64_t loops = 0;    ///< versions with a correction of all poses: loops, pose graph
   double loop_max_ms = 0;     ///< until the mesh had moved with the submaps, the slowest
-  double joined_max_ms = 0;   ///< until submaps that moved by more than two voxels had been joined anew
+  double joined_max_ms = 0;   ///< until submaps that moved by more than two voxels had been joined anew, or
+                              ///< the run's end; so below
   double settled_max_ms = 0;  ///< likewise until all submaps that were bent were in the mesh as fused anew
   double memory_mb = 0;       ///< of the joined samples and the mesh, at most [MiB]
 };
