@@ -78,20 +78,21 @@ void LiveMesh::read_times() {
 /// All that is new in this version of the map is marked now, unless depth has not come yet.
 void LiveMesh::take_times(const SubmapSurface& surface, std::uint64_t version) {
   read_times();
-  const auto [marked, made] = composition_.of_new();
+  const Composition::Progress of_new = composition_.of_new();
   const std::int64_t now_ns = steady_now_ns();
   for (MapTime& time : map_times_)
-    if (time.version <= version && !time.made_until && surface.unfused() == 0) time.made_until = marked;
-  const auto is_in = [&](const MapTime& time) { return time.made_until && *time.made_until <= made; };
+    if (time.version <= version && !time.made_until && surface.unfused() == 0)
+      time.made_until = of_new.marked;
+  const auto is_in = [&](const MapTime& time) { return time.made_until && *time.made_until <= of_new.made; };
   for (; !map_times_.empty() && is_in(map_times_.front()); map_times_.pop_front())
     behind_.record(now_ns - map_times_.front().published_ns);
 }
 
 void LiveMesh::take_joined() {
-  const auto [marked, made] = composition_.of_moved();
+  const Composition::Progress of_moved = composition_.of_moved();
   for (Change& change : unjoined_)
-    if (!change.made_until) change.made_until = marked;
-  for (; !unjoined_.empty() && *unjoined_.front().made_until <= made; unjoined_.pop_front())
+    if (!change.made_until) change.made_until = of_moved.marked;
+  for (; !unjoined_.empty() && *unjoined_.front().made_until <= of_moved.made; unjoined_.pop_front())
     joined_.record(steady_now_ns() - unjoined_.front().published_ns);
 }
 
