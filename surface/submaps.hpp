@@ -101,9 +101,11 @@ class SubmapSurface {
   void step(const GraphSnapshot& graph, const SubmapWork& work = {});
   /// Submaps that are bent and wait to be fused anew.
   [[nodiscard]] std::size_t bent() const { return bent_; }
-  /// Of the newest keyframes of the last step's map (max_waiting of them), those whose depth is not fused
-  /// yet, or has not come.
-  [[nodiscard]] std::size_t unfused() const { return without_depth_.size(); }
+  /// Of the last step's map, the first keyframe whose depth may still be fused, or come: all before are done
+  /// with. The number of keyframes, if there is none.
+  [[nodiscard]] std::size_t first_unfused() const {
+    return without_depth_.empty() ? next_keyframe_ : index(without_depth_.front());
+  }
   /// Whether the last step could have fused more new keyframes.
   [[nodiscard]] bool keyframes_left() const { return keyframes_left_; }
   /// Whether the last step left anything to do in the map it had.

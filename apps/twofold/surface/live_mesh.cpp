@@ -11,7 +11,7 @@ namespace twofold {
 void LiveMesh::published(const GraphSnapshot& graph) {
   const std::uint64_t change = graph.last_change().version;
   // A full ring leaves a figure out.
-  (void)times_.try_push({graph.version(), steady_now_ns(), change > last_change_});
+  (void)times_.try_push({graph.version(), steady_now_ns(), graph.keyframe_count(), change > last_change_});
   last_change_ = change;
 }
 
@@ -75,13 +75,13 @@ void LiveMesh::read_times() {
   for (MapTime time; times_.try_pop(time);) map_times_.push_back(time);
 }
 
-/// All that is new in this version of the map is marked now, unless depth has not come yet.
+/// All that is new in this version of the map is marked now, if the depth of its keyframes has come.
 void LiveMesh::take_times(const SubmapSurface& surface, std::uint64_t version) {
   read_times();
   const Composition::Progress of_new = composition_.of_new();
   const std::int64_t now_ns = steady_now_ns();
   for (MapTime& time : map_times_)
-    if (time.version <= version && !time.made_until && surface.unfused() == 0)
+    if (time.version <= version && time.keyframes <= surface.first_unfused() && !time.made_until)
       time.made_until = of_new.marked;
   const auto is_in = [&](const MapTime& time) { return time.made_until && *time.made_until <= of_new.made; };
   for (; !map_times_.empty() && is_in(map_times_.front()); map_times_.pop_front())

@@ -19,7 +19,8 @@ namespace twofold {
 struct MapTime {
   std::uint64_t version = 0;
   std::int64_t published_ns = 0;
-  bool changed = false;  ///< a map change came with it: a loop, the pose graph, joined parts
+  std::size_t keyframes = 0;  ///< ever made
+  bool changed = false;       ///< a map change came with it: a loop, the pose graph, joined parts
   /// Composition::of_new().made when all that is new in it is in the mesh; nothing: depth of its keyframes is
   /// missing.
   std::optional<std::uint64_t> made_until = {};
