@@ -221,7 +221,9 @@ void Composition::mark(std::uint32_t block, std::uint32_t changed, Mark as) {
   queues_[as].push_back(block);
 }
 
+/// Empty where nothing is.
 std::vector<Pending> Composition::pending() const {
+  if (!unfinished()) return {};
   std::vector<Pending> of_blocks(marks_.size());
   for (std::size_t b = 0; b < marks_.size(); ++b) {
     if (marks_[b] != kNone) of_blocks[b] = reached_[b].is_elsewhere ? Pending::kOthers : Pending::kChanges;

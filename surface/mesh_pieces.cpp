@@ -100,12 +100,17 @@ std::size_t MeshPieces::update(const SurfaceVolume& volume, std::span<const Pend
     for (const auto& [at, old] : pieces_)
       if (!volume.blocks().number_of(at)) any |= replace(at, piece);
   }
+  // Neighbours that wait, or whose own samples are as before, end in other vertices.
+  const bool any_elsewhere = !pending.empty() || !moved_.empty();
   BlockMesher mesher(volume, pending);
   const std::vector<std::uint32_t> blocks = outdated(volume, pending);
   for (const std::uint32_t b : blocks) {
     const BlockPosition& at = volume.blocks().head(b).at;
     mesher.extract(at, piece);
-    any |= replace(at, piece);
+    if (replace(at, piece)) {
+      any = true;
+      if (any_elsewhere) touch(at);
+    }
     make_way();
   }
   if (!any) revision_ = before;
@@ -149,7 +154,6 @@ bool MeshPieces::replace(const BlockPosition& at, const BlockMesh& piece) {
   if (old == pieces_.end()) {
     if (piece.empty()) return false;
     pieces_.emplace(at, Piece{piece, revision_});
-    touch(at);
     return true;
   }
   if (old->second.mesh == piece) return false;
@@ -157,7 +161,7 @@ bool MeshPieces::replace(const BlockPosition& at, const BlockMesh& piece) {
     old->second.mesh = BlockMesh();  // gives its memory back
   else
     old->second.mesh = piece;  // into the memory it has
-  touch(at);
+  old->second.revision = revision_;
   return true;
 }
 
