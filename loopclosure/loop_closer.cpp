@@ -61,7 +61,7 @@ std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe,
   const auto consistent = recogniser_.recognise(keyframe.id, view.bag, likeness, graph);
   const auto place = consistent.empty() ? only_place(in_older_parts(keyframe.id, view.bag, graph), view,
                                                      keyframe.images, graph)
-                                        : first_place(consistent, view, keyframe.images, graph);
+                                        : first_place(consistent, keyframe.id, view, keyframe.images, graph);
   std::optional<LoopConstraint> loop;
   if (const auto scale = place ? scale_of(*place) : std::nullopt) {
     const SE3 T_to_from(place->T_c_k.so3(), *scale * place->T_c_k.translation());
@@ -97,14 +97,19 @@ std::optional<Relocalisation> LoopCloser::relocalise(const FrameImages& images, 
                     view, images, graph);
 }
 
-/// The likeliest of the candidates that is verified.
+/// The likeliest of the candidates that is verified, and exactly in the keyframe's own part of the map: where
+/// it is there is known but for drift, and a rough pose would put error in instead of taking drift out.
 std::optional<Relocalisation> LoopCloser::first_place(const std::vector<PlaceCandidate>& candidates,
-                                                      const DescribedPlace& view, const FrameImages& images,
-                                                      const GraphSnapshot& graph) {
+                                                      KeyframeId id, const DescribedPlace& view,
+                                                      const FrameImages& images, const GraphSnapshot& graph) {
   views_with_depth_.clear();
   for (const PlaceCandidate& candidate : candidates) {
-    auto verified = verify(candidate.keyframe, view, images, graph);
-    if (verified && scale_of(*verified)) return verified;
+    const auto T_mapped = pose_in_map(graph, id, candidate.keyframe);
+    auto verified = verify(candidate.keyframe, view, images, graph, T_mapped);
+    const bool exact =
+        verified && (!T_mapped ||
+                     verified->sigma <= options_.max_sigma * graph.keyframe(candidate.keyframe).median_depth);
+    if (exact && scale_of(*verified)) return verified;
   }
   return std::nullopt;
 }
@@ -130,7 +135,8 @@ std::optional<Relocalisation> LoopCloser::only_place(const std::vector<PlaceCand
 }
 
 std::optional<Relocalisation> LoopCloser::verify(KeyframeId k, const DescribedPlace& view,
-                                                 const FrameImages& images, const GraphSnapshot& graph) {
+                                                 const FrameImages& images, const GraphSnapshot& graph,
+                                                 const std::optional<SE3>& T_mapped) {
   if (!graph.contains(k)) return std::nullopt;
   const PlaceAppearance* own = view_of(k, graph);
   if (own == nullptr) return std::nullopt;
@@ -138,16 +144,34 @@ std::optional<Relocalisation> LoopCloser::verify(KeyframeId k, const DescribedPl
       rig_, *own, [&] { return views_of_place(k, graph); }, view, options_.verification);
   if (!place) return std::nullopt;
   RefinedPlace refined;
-  switch (refinement_.refine(graph, k, images, place->T_b_a, refined)) {
+  switch (refine(graph, k, images, place->T_b_a, T_mapped, refined)) {
     case RefinementOutcome::kRefined:
-      return Relocalisation{k, refined.T_c_k, refined.inliers, refined.weight};
+      return Relocalisation{k, refined.T_c_k, refined.inliers, refined.weight, refined.sigma};
     case RefinementOutcome::kTooFewPoints:
       if (rig_.kind == SensorKind::kMono) return std::nullopt;
-      return Relocalisation{k, place->T_b_a, place->inliers, place->inliers};
+      return Relocalisation{k, place->T_b_a, place->inliers, 1};
     case RefinementOutcome::kContradicted:
       break;
   }
   return std::nullopt;
+}
+
+/// From where the corners have the view, and from where the map has it, if that is known. Corners of a wall
+/// far away fit many poses nearly as well, and the search around a wrong one finds those points alone that
+/// fit there: a pose beside the map's must explain clearly more of the points.
+RefinementOutcome LoopCloser::refine(const GraphSnapshot& graph, KeyframeId k, const FrameImages& images,
+                                     const SE3& T_c_k, const std::optional<SE3>& T_mapped,
+                                     RefinedPlace& result) {
+  const RefinementOutcome seen = refinement_.refine(graph, k, images, T_c_k, result);
+  if (!T_mapped || seen != RefinementOutcome::kRefined) return seen;
+  RefinedPlace as_mapped;
+  if (refinement_.refine(graph, k, images, *T_mapped, as_mapped) == RefinementOutcome::kRefined &&
+      as_mapped.inliers >= options_.as_mapped_share * result.inliers) {
+    result = as_mapped;
+    return seen;
+  }
+  return refinement_.refine(graph, k, images, T_c_k,
+                            result);  // once more: what it found last is the answer's
 }
 
 /// What lengths around the keyframe at hand measure over what they measure around the place (the inverse

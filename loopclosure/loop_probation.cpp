@@ -6,16 +6,12 @@
 #include "base/angles.hpp"
 
 namespace twofold {
-namespace {
 
-/// p_to = S_to_from * p_from along the map's poses; none if they are of different parts, or forgotten.
-std::optional<Sim3> pose_in_map(const GraphSnapshot& graph, KeyframeId to, KeyframeId from) {
+std::optional<SE3> pose_in_map(const GraphSnapshot& graph, KeyframeId to, KeyframeId from) {
   const KeyframeId part = graph.part(to);
   if (part == kNoKeyframe || graph.part(from) != part) return std::nullopt;
-  return Sim3(graph.T_k_w(to) * graph.T_k_w(from).inverse());
+  return graph.T_k_w(to) * graph.T_k_w(from).inverse();
 }
-
-}  // namespace
 
 bool LoopProbation::confirms(const LoopConstraint& loop, const GraphSnapshot& graph) {
   std::erase_if(held_, [&](const Held& held) {
@@ -23,7 +19,7 @@ bool LoopProbation::confirms(const LoopConstraint& loop, const GraphSnapshot& gr
   });
   const auto as_mapped = pose_in_map(graph, loop.to, loop.from);
   const double depth = loop.scale * graph.keyframe(loop.from).median_depth;
-  const bool mapped = as_mapped && same_pose(*as_mapped, loop.S_to_from(), depth);
+  const bool mapped = as_mapped && same_pose(Sim3(*as_mapped), loop.S_to_from(), depth);
   const bool explained = mapped || !as_mapped || drift_.explains(graph, loop.from, loop.to, loop.S_to_from());
   const bool witnessed = std::any_of(held_.begin(), held_.end(), [&](const Held& held) {
     return held.explained && agree(held.loop, loop, graph);
@@ -41,7 +37,7 @@ bool LoopProbation::agree(const LoopConstraint& held, const LoopConstraint& loop
   const auto T_to_to = pose_in_map(graph, loop.to, held.to);
   const auto T_from_from = pose_in_map(graph, held.from, loop.from);
   if (held.to == loop.to || !T_to_to || !T_from_from) return false;
-  return same_pose(*T_to_to * held.S_to_from() * *T_from_from, loop.S_to_from(),
+  return same_pose(Sim3(*T_to_to) * held.S_to_from() * Sim3(*T_from_from), loop.S_to_from(),
                    loop.scale * graph.keyframe(loop.from).median_depth);
 }
 
@@ -57,13 +53,14 @@ bool LoopProbation::exclude_each_other(const LoopConstraint& held, const LoopCon
                                        const GraphSnapshot& graph) const {
   const auto T_to_to = pose_in_map(graph, loop.to, held.to);
   if (!T_to_to) return false;
-  return contradicts(loop.from, held.from, loop.S_to_from().inverse() * *T_to_to * held.S_to_from(), graph);
+  return contradicts(loop.from, held.from, loop.S_to_from().inverse() * Sim3(*T_to_to) * held.S_to_from(),
+                     graph);
 }
 
 bool LoopProbation::contradicts(KeyframeId b, KeyframeId a, const Sim3& S_b_a,
                                 const GraphSnapshot& graph) const {
   const auto as_mapped = pose_in_map(graph, b, a);
-  return as_mapped && !same_pose(*as_mapped, S_b_a, graph.keyframe(b).median_depth) &&
+  return as_mapped && !same_pose(Sim3(*as_mapped), S_b_a, graph.keyframe(b).median_depth) &&
          !drift_.explains(graph, a, b, S_b_a);
 }
 

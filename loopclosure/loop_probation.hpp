@@ -22,6 +22,9 @@ struct ProbationOptions {
   [[nodiscard]] std::string invalid_reason() const;
 };
 
+/// T_to_from along the map's poses; none if the keyframes are of different parts, or forgotten.
+[[nodiscard]] std::optional<SE3> pose_in_map(const GraphSnapshot& graph, KeyframeId to, KeyframeId from);
+
 /// Holds a loop back until something else says the same, because a wrong one cannot be undone: the map as it
 /// is, where both its keyframes are of one part, or a second keyframe whose own loop agrees along the map's
 /// poses.

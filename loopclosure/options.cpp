@@ -104,6 +104,8 @@ std::string LoopCloserOptions::invalid_reason() const {
       .at_least("place_views", place_views, 1)
       .at_least("relocalisation_candidates", relocalisation_candidates, 1)
       .nested("depths", depths.invalid_reason())
+      .within("as_mapped_share", as_mapped_share, 0, 1)
+      .above("max_sigma", max_sigma, 0)
       .at_least("min_scale_points", min_scale_points, 1)
       .reason();
 }

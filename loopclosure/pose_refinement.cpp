@@ -1,5 +1,6 @@
 #include "loopclosure/pose_refinement.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -19,6 +20,7 @@ RefinementOutcome PoseRefinement::refine(const GraphSnapshot& graph, KeyframeId 
     result.inliers = motion.inliers;
     if (!motion.converged || motion.inliers < options_.min_inliers) return RefinementOutcome::kContradicted;
     result.T_c_k = motion.T_c_ref;
+    result.sigma = std::sqrt(motion.information.inverse().topLeftCorner<3, 3>().trace());
   }
   result.weight = weight_of_inliers();
   const bool agreed = result.inliers >= options_.min_inlier_share * static_cast<double>(found_.size()) &&

@@ -37,6 +37,7 @@ struct RefinedPlace {
   /// more than pixels' noise, as of a point that both keyframes of an edge measure (edge_information);
   /// towards 0 where its depth shifts it by more.
   int weight = 1;
+  double sigma = 0;  ///< standard deviation of the position T_c_k [m], by the inliers
 };
 
 enum class RefinementOutcome : std::uint8_t {

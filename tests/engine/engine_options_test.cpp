@@ -244,6 +244,8 @@ TEST(Options, OfTheLoopCloserSayWhyTheyAreInvalid) {
        {"probation.drift.step_turn", [](auto& o) { o.probation.drift.step_turn = 0; }},
        {"depths.max_distance_share", [](auto& o) { o.depths.max_distance_share = 0; }},
        {"depths.max_depth_ratio", [](auto& o) { o.depths.max_depth_ratio = 0.9; }},
+       {"as_mapped_share", [](auto& o) { o.as_mapped_share = 1.1; }},
+       {"max_sigma", [](auto& o) { o.max_sigma = 0; }},
        {"min_scale_points", [](auto& o) { o.min_scale_points = 0; }},
        {"relocalisation_candidates", [](auto& o) { o.relocalisation_candidates = 0; }}});
 }

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "tests/loopclosure/turning_camera.hpp"
 
 namespace twofold {
@@ -13,9 +15,11 @@ using testing::vocabulary;
 
 class LoopCloserTest : public testing::TurningCamera {
  protected:
+  /// The map has keyframes alone: without its points, poses are as rough as they may be.
   static LoopCloserOptions options() {
     LoopCloserOptions options;
     options.recogniser.near_keyframes = 12;
+    options.max_sigma = std::numeric_limits<double>::infinity();
     return options;
   }
 };
@@ -36,6 +40,19 @@ TEST_F(LoopCloserTest, ClosesTheLoopWhenTheCameraComesBackAndNotBefore) {
     EXPECT_LT((loop->T_to_from * T_to_from.inverse()).log().norm(), k < kTurn - 1 ? 0.1 : 0.03) << k;
   }
   EXPECT_GE(loops, 2);
+}
+
+TEST_F(LoopCloserTest, ARoughPoseIsNoLoopWhereTheMapKnowsBetter) {
+  LoopCloserOptions exact = options();
+  exact.max_sigma = LoopCloserOptions{}.max_sigma;
+  LoopCloser closer(rig_, vocabulary(), exact);
+  for (int k = 0; k < kTurn + 6; ++k) {
+    add_to_map(k);
+    EXPECT_FALSE(closer.step(keyframe(k), graph_)) << k;
+  }
+  const auto place = closer.relocalise(keyframe(kTurn + 4).images, graph_);
+  ASSERT_TRUE(place) << "who is lost is glad of it";
+  EXPECT_EQ(place->weight, 1);
 }
 
 TEST_F(LoopCloserTest, OneLikenessAloneIsNotEnough) {
