@@ -67,7 +67,10 @@ std::optional<LoopConstraint> LoopCloser::step(const KeyframeProposal& keyframe,
     const SE3 T_to_from(place->T_c_k.so3(), *scale * place->T_c_k.translation());
     const LoopConstraint seen{graph.version(), place->keyframe, keyframe.id, T_to_from,
                               place->inliers,  place->weight,   *scale};
-    if (probation_.confirms(seen, graph) && !(one_camera && redundant_.has(seen, refinement_.found(), graph)))
+    if (!is_exact(seen, *scale * place->sigma, graph))
+      probation_.hold(seen);
+    else if (probation_.confirms(seen, graph) &&
+             !(one_camera && redundant_.has(seen, refinement_.found(), graph)))
       loop = seen;
   }
   if (one_camera) view.pixels.clear();  // the map may change
@@ -97,19 +100,25 @@ std::optional<Relocalisation> LoopCloser::relocalise(const FrameImages& images, 
                     view, images, graph);
 }
 
-/// The likeliest of the candidates that is verified, and exactly in the keyframe's own part of the map: where
-/// it is there is known but for drift, and a rough pose would put error in instead of taking drift out.
+/// Whether a loop knows better than the map does where the keyframe is. Within a part the map does but for
+/// drift, and a rough pose would put error in instead of taking drift out.
+bool LoopCloser::is_exact(const LoopConstraint& loop, double sigma, const GraphSnapshot& graph) const {
+  const auto T_mapped = pose_in_map(graph, loop.to, loop.from);
+  if (!T_mapped) return true;
+  const double correction = (loop.T_to_from * T_mapped->inverse()).translation().norm();
+  return sigma <= std::max(options_.max_sigma * graph.keyframe(loop.to).median_depth,
+                           options_.max_sigma_share * correction);
+}
+
+/// The likeliest of the candidates that is verified.
 std::optional<Relocalisation> LoopCloser::first_place(const std::vector<PlaceCandidate>& candidates,
                                                       KeyframeId id, const DescribedPlace& view,
                                                       const FrameImages& images, const GraphSnapshot& graph) {
   views_with_depth_.clear();
   for (const PlaceCandidate& candidate : candidates) {
-    const auto T_mapped = pose_in_map(graph, id, candidate.keyframe);
-    auto verified = verify(candidate.keyframe, view, images, graph, T_mapped);
-    const bool exact =
-        verified && (!T_mapped ||
-                     verified->sigma <= options_.max_sigma * graph.keyframe(candidate.keyframe).median_depth);
-    if (exact && scale_of(*verified)) return verified;
+    auto verified =
+        verify(candidate.keyframe, view, images, graph, pose_in_map(graph, id, candidate.keyframe));
+    if (verified && scale_of(*verified)) return verified;
   }
   return std::nullopt;
 }

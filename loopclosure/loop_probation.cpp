@@ -14,22 +14,30 @@ std::optional<SE3> pose_in_map(const GraphSnapshot& graph, KeyframeId to, Keyfra
 }
 
 bool LoopProbation::confirms(const LoopConstraint& loop, const GraphSnapshot& graph) {
-  std::erase_if(held_, [&](const Held& held) {
-    return index(held.loop.to) + static_cast<std::uint32_t>(options_.patience) < index(loop.to);
-  });
+  end_patience(loop.to);
   const auto as_mapped = pose_in_map(graph, loop.to, loop.from);
   const double depth = loop.scale * graph.keyframe(loop.from).median_depth;
   const bool mapped = as_mapped && same_pose(Sim3(*as_mapped), loop.S_to_from(), depth);
   const bool explained = mapped || !as_mapped || drift_.explains(graph, loop.from, loop.to, loop.S_to_from());
   const bool witnessed = std::any_of(held_.begin(), held_.end(), [&](const Held& held) {
-    return held.explained && agree(held.loop, loop, graph);
+    return held.witness && agree(held.loop, loop, graph);
   });
-  const bool confirmed =
-      mapped || (explained && witnessed && std::none_of(held_.begin(), held_.end(), [&](const Held& held) {
-                   return exclude_each_other(held.loop, loop, graph);
-                 }));
+  const bool contradicted = std::any_of(held_.begin(), held_.end(), [&](const Held& held) {
+    return exclude_each_other(held.loop, loop, graph);
+  });
   held_.push_back({loop, explained});
-  return confirmed;
+  return mapped || (explained && witnessed && !contradicted);
+}
+
+void LoopProbation::hold(const LoopConstraint& loop) {
+  end_patience(loop.to);
+  held_.push_back({loop, false});
+}
+
+void LoopProbation::end_patience(KeyframeId now) {
+  std::erase_if(held_, [&](const Held& held) {
+    return index(held.loop.to) + static_cast<std::uint32_t>(options_.patience) < index(now);
+  });
 }
 
 bool LoopProbation::agree(const LoopConstraint& held, const LoopConstraint& loop,

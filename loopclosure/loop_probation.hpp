@@ -45,6 +45,8 @@ class LoopProbation {
   /// @param loop  verified between keyframes of `graph`; to be called in the order of loop.to
   /// @return whether it may join the map now; else it is held as a witness
   [[nodiscard]] bool confirms(const LoopConstraint& loop, const GraphSnapshot& graph);
+  /// A loop too rough to join the map or to speak for another one: it only shows which places look alike.
+  void hold(const LoopConstraint& loop);
 
   /// Whether the map has two of its keyframes elsewhere to each other than p_b = S_b_a * p_a, and the way
   /// between them does not explain it. Of two parts it says nothing.
@@ -54,9 +56,10 @@ class LoopProbation {
  private:
   struct Held {
     LoopConstraint loop;
-    bool explained;  ///< by drift; else it is no witness, but shows that places look alike
+    bool witness;  ///< exact, and explained by drift; else it only shows that places look alike
   };
 
+  void end_patience(KeyframeId now);
   [[nodiscard]] bool agree(const LoopConstraint& held, const LoopConstraint& loop,
                            const GraphSnapshot& graph) const;
   [[nodiscard]] bool exclude_each_other(const LoopConstraint& held, const LoopConstraint& loop,

@@ -37,7 +37,9 @@ struct RefinedPlace {
   /// more than pixels' noise, as of a point that both keyframes of an edge measure (edge_information);
   /// towards 0 where its depth shifts it by more.
   int weight = 1;
-  double sigma = 0;  ///< standard deviation of the position T_c_k [m], by the inliers
+  /// Standard deviation of the position [m], by the inliers; their errors are taken as independent of each
+  /// other, and the poses around the place as true.
+  double sigma = 0;
 };
 
 enum class RefinementOutcome : std::uint8_t {

@@ -20,7 +20,8 @@ int strongest_inner_neighbour(const GraphSnapshot& graph, const DoubleWindow& wi
   return best;
 }
 
-/// Covisibility as it is now. A loop found by appearance has more matches than shared points: it keeps them.
+/// Covisibility as it is now. A loop found by appearance has more matches than shared points: it keeps their
+/// weight.
 int present_weight(const Keyframe& from, const Keyframe& to) {
   const Edge& edge = *find_edge(from, to.id);
   const int shared = shared_points(from, to);

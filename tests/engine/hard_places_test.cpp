@@ -186,34 +186,35 @@ TEST(HardPlaces, AfterALossABareCorridorIsMappedOn) {
   }
 }
 
-class FewPoints : public ::testing::TestWithParam<std::uint64_t> {};
-
 /// Few pixels, and windows so narrow that places are recognised which lie just behind the camera. Thirty
 /// corners of the wall ahead, their depths from one frame each, fitted poses up to 1.2 m and 5 degrees beside
 /// the map's, which was right to a centimetre: the path became six times as wrong as it had been.
-TEST_P(FewPoints, MakeNoLoopBesideWhereTheMapIsRight) {
-  SyntheticOptions scene = small("courtyard", 280);
-  scene.fps = 30;
-  scene.noise = 2;
-  scene.seed = GetParam();
-  const SyntheticSequence sequence(scene);
+TEST(HardPlaces, FewPointsMakeNoLoopBesideWhereTheMapIsRight) {
   EngineOptions options;
   options.vocabulary = std::make_shared<const Vocabulary>(load_default_vocabulary());
   options.mapper.inner_window = 8;
   options.mapper.outer_window = 40;
-  const auto [result, path] = testing::run_whole(sequence.rig(), testing::frames_of(sequence), options);
-  double farthest = 0;
-  for (const ClosedLoop& loop : result.loops)
-    farthest = std::max(farthest, loop.drift().translation().norm());
-  const auto evaluation = evaluate(associate(path, testing::true_path(sequence), 1'000'000), {});
-  ASSERT_TRUE(evaluation);
-  std::printf("few points: %zu loops, the farthest by %.3f m, ATE %.4f m\n", result.loops.size(), farthest,
-              evaluation->absolute.rmse);
-  EXPECT_LT(farthest, 0.06);
-  EXPECT_LT(evaluation->absolute.rmse, 0.012);
+  std::size_t loops = 0;
+  for (const std::uint64_t seed : {1, 3, 4, 5}) {
+    SyntheticOptions scene = small("courtyard", 280);
+    scene.fps = 30;
+    scene.noise = 2;
+    scene.seed = seed;
+    const SyntheticSequence sequence(scene);
+    const auto [result, path] = testing::run_whole(sequence.rig(), testing::frames_of(sequence), options);
+    double farthest = 0;
+    for (const ClosedLoop& loop : result.loops)
+      farthest = std::max(farthest, loop.drift().translation().norm());
+    const auto evaluation = evaluate(associate(path, testing::true_path(sequence), 1'000'000), {});
+    ASSERT_TRUE(evaluation);
+    std::printf("few points: %zu loops, the farthest by %.3f m, ATE %.4f m\n", result.loops.size(), farthest,
+                evaluation->absolute.rmse);
+    EXPECT_LT(farthest, 0.06) << seed;
+    EXPECT_LT(evaluation->absolute.rmse, 0.012) << seed;
+    loops += result.loops.size();
+  }
+  EXPECT_GE(loops, 8U) << "places seen again";
 }
-
-INSTANTIATE_TEST_SUITE_P(HardPlaces, FewPoints, ::testing::Values(1, 4, 5));
 
 }  // namespace
 }  // namespace twofold

@@ -147,6 +147,7 @@ TEST_F(LoopCloserTest, EveryPlaceIsFoundAfterHundredsOfThousandsOfKeyframes) {
   for (std::uint32_t k = 0; k < kBefore; ++k) writer_.add_culled_keyframe({});
   LoopCloser closer(rig_, vocabulary(), options());
   std::vector<KeyframeProposal> views;
+  views.reserve(kPlaces);
   for (int k = 0; k < kPlaces; ++k) views.push_back(keyframe(kTurn / kPlaces * k));
   std::uint32_t next = kBefore;
   const auto add = [&](int view) {

@@ -51,6 +51,12 @@ TEST_F(LoopProbationTest, AWrongOneFindsNoWitness) {
   EXPECT_TRUE(probation_.confirms(loop(4, 14), graph_)) << "whom the wrong ones do not hold up";
 }
 
+TEST_F(LoopProbationTest, ARoughOneIsNoWitnessAndNotHeldForEver) {
+  probation_.hold(loop(1, 11));
+  EXPECT_FALSE(probation_.confirms(loop(3, 12), graph_));
+  EXPECT_TRUE(probation_.confirms(loop(3, 13), graph_));
+}
+
 TEST_F(LoopProbationTest, AWrongDirectionIsNoAgreement) {
   EXPECT_FALSE(probation_.confirms(loop(1, 11), graph_));
   EXPECT_FALSE(probation_.confirms(loop(2, 12, SE3(SO3::exp({0, 0.15, 0}), Vector3::Zero())), graph_));
@@ -159,9 +165,13 @@ TEST_F(LoopProbationTest, AViewThatFitsTwoPlacesIsNotBelieved) {
   for (std::uint32_t k = 10; k < 20; ++k) writer_.set_pose(KeyframeId{k}, drift_ * truth(k));
   graph_ = writer_.publish();
   const SE3 a_house(SO3(), Vector3(6, 0, 0));  // looks like the place that is 6 m on
+  const LoopConstraint other{1, KeyframeId{8}, KeyframeId{12}, loop(8, 12).T_to_from * a_house, 100};
+  LoopProbation rough(SensorKind::kStereo, {});
+  EXPECT_FALSE(rough.confirms(loop(2, 11), graph_));
+  rough.hold(other);
+  EXPECT_FALSE(rough.confirms(loop(3, 13), graph_)) << "a rough one shows it, too";
   EXPECT_FALSE(probation_.confirms(loop(2, 11), graph_));
-  EXPECT_FALSE(
-      probation_.confirms({1, KeyframeId{8}, KeyframeId{12}, loop(8, 12).T_to_from * a_house, 100}, graph_));
+  EXPECT_FALSE(probation_.confirms(other, graph_));
   EXPECT_FALSE(probation_.confirms(loop(3, 13), graph_)) << "though 11 agrees";
   for (std::uint32_t k = 10; k < 20; ++k) writer_.set_pose(KeyframeId{k}, truth(k));
   graph_ = writer_.publish();
