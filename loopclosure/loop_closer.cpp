@@ -17,6 +17,8 @@ LoopCloserOptions validated(const LoopCloserOptions& options) {
   return options;
 }
 
+constexpr double kSamePlace = 3;  // standard deviations
+
 /// With one camera, depths are written as if there was a second one at the map's unit of length.
 Rig with_baseline(Rig rig) {
   if (rig.kind == SensorKind::kMono) rig.baseline = 1;
@@ -103,11 +105,8 @@ std::optional<Relocalisation> LoopCloser::relocalise(const FrameImages& images, 
 /// Whether a loop knows better than the map does where the keyframe is. Within a part the map does but for
 /// drift, and a rough pose would put error in instead of taking drift out.
 bool LoopCloser::is_exact(const LoopConstraint& loop, double sigma, const GraphSnapshot& graph) const {
-  const auto T_mapped = pose_in_map(graph, loop.to, loop.from);
-  if (!T_mapped) return true;
-  const double correction = (loop.T_to_from * T_mapped->inverse()).translation().norm();
-  return sigma <= std::max(options_.max_sigma * graph.keyframe(loop.to).median_depth,
-                           options_.max_sigma_share * correction);
+  return graph.part(loop.to) != graph.part(loop.from) ||
+         sigma <= options_.max_sigma * graph.keyframe(loop.to).median_depth;
 }
 
 /// The likeliest of the candidates that is verified.
@@ -165,19 +164,24 @@ std::optional<Relocalisation> LoopCloser::verify(KeyframeId k, const DescribedPl
   return std::nullopt;
 }
 
-/// From where the corners have the view, and from where the map has it, if that is known. Corners of a wall
-/// far away fit many poses nearly as well, and the search around a wrong one finds those points alone that
-/// fit there: a pose beside the map's must explain clearly more of the points.
+/// From where the corners have the view, and from where the map has it, if that is known. Where both lead to
+/// one place, what knows it better is kept. Else corners of a wall far away may have fitted a wrong pose,
+/// around which the search found those points alone that fit there: such a pose must explain clearly more of
+/// them.
 RefinementOutcome LoopCloser::refine(const GraphSnapshot& graph, KeyframeId k, const FrameImages& images,
                                      const SE3& T_c_k, const std::optional<SE3>& T_mapped,
                                      RefinedPlace& result) {
   const RefinementOutcome seen = refinement_.refine(graph, k, images, T_c_k, result);
   if (!T_mapped || seen != RefinementOutcome::kRefined) return seen;
   RefinedPlace as_mapped;
-  if (refinement_.refine(graph, k, images, *T_mapped, as_mapped) == RefinementOutcome::kRefined &&
-      as_mapped.inliers >= options_.as_mapped_share * result.inliers) {
-    result = as_mapped;
-    return seen;
+  if (refinement_.refine(graph, k, images, *T_mapped, as_mapped) == RefinementOutcome::kRefined) {
+    const double apart = (as_mapped.T_c_k * result.T_c_k.inverse()).translation().norm();
+    const bool one_place = apart <= kSamePlace * std::max(as_mapped.sigma, result.sigma);
+    if (one_place ? as_mapped.sigma <= result.sigma
+                  : as_mapped.inliers >= options_.as_mapped_share * result.inliers) {
+      result = as_mapped;
+      return seen;
+    }
   }
   return refinement_.refine(graph, k, images, T_c_k,
                             result);  // once more: what it found last is the answer's

@@ -29,13 +29,13 @@ struct LoopCloserOptions {
   RedundantLoopOptions redundant;
   int place_views = 5;                 ///< keyframes of N1 whose corners are a place's, itself included, >= 1
   int relocalisation_candidates = 10;  ///< places tried for a lost camera, >= 1
-  /// Of the points that a loop explains: where as many are found from the map's own pose on, that is where
-  /// the camera is, in [0, 1].
-  double as_mapped_share = 0.9;
-  // Within one part of the map a loop's position must be known to either. Standard deviations of real loops
-  // were 0.0002 to 0.009 of the depth, of those beside the truth 0.01 to 0.04, and a third of the correction.
-  double max_sigma = 0.01;        ///< share of the scene's median depth, > 0
-  double max_sigma_share = 0.1;   ///< share of what the loop corrects, >= 0
+  /// Of the points that a loop explains beside where the map has the camera: if as many are found from there
+  /// on, that is where it is, in [0, 1].
+  double as_mapped_share = 0.8;
+  /// Standard deviation of a loop's position within one part of the map, share of the scene's median depth, >
+  /// 0. Real loops were known to 0.0002 to 0.009 of it, also those that corrected metres; those beside the
+  /// truth to 0.01 to 0.04.
+  double max_sigma = 0.01;
   DepthRegressionOptions depths;  ///< of one camera's corners
   int min_scale_points = 12;      ///< that say how one camera's units differ; with fewer nobody knows, >= 1
 

@@ -22,11 +22,12 @@ bool LoopProbation::confirms(const LoopConstraint& loop, const GraphSnapshot& gr
   const bool witnessed = std::any_of(held_.begin(), held_.end(), [&](const Held& held) {
     return held.witness && agree(held.loop, loop, graph);
   });
-  const bool contradicted = std::any_of(held_.begin(), held_.end(), [&](const Held& held) {
-    return exclude_each_other(held.loop, loop, graph);
-  });
+  const bool confirmed =
+      mapped || (explained && witnessed && std::none_of(held_.begin(), held_.end(), [&](const Held& held) {
+                   return exclude_each_other(held.loop, loop, graph);
+                 }));
   held_.push_back({loop, explained});
-  return mapped || (explained && witnessed && !contradicted);
+  return confirmed;
 }
 
 void LoopProbation::hold(const LoopConstraint& loop) {

@@ -56,7 +56,7 @@ class LoopProbation {
  private:
   struct Held {
     LoopConstraint loop;
-    bool witness;  ///< exact, and explained by drift; else it only shows that places look alike
+    bool witness;  ///< not rough, and explained by drift; else it only shows that places look alike
   };
 
   void end_patience(KeyframeId now);

@@ -106,7 +106,6 @@ std::string LoopCloserOptions::invalid_reason() const {
       .nested("depths", depths.invalid_reason())
       .within("as_mapped_share", as_mapped_share, 0, 1)
       .above("max_sigma", max_sigma, 0)
-      .at_least("max_sigma_share", max_sigma_share, 0)
       .at_least("min_scale_points", min_scale_points, 1)
       .reason();
 }

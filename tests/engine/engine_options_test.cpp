@@ -246,7 +246,6 @@ TEST(Options, OfTheLoopCloserSayWhyTheyAreInvalid) {
        {"depths.max_depth_ratio", [](auto& o) { o.depths.max_depth_ratio = 0.9; }},
        {"as_mapped_share", [](auto& o) { o.as_mapped_share = 1.1; }},
        {"max_sigma", [](auto& o) { o.max_sigma = 0; }},
-       {"max_sigma_share", [](auto& o) { o.max_sigma_share = -1; }},
        {"min_scale_points", [](auto& o) { o.min_scale_points = 0; }},
        {"relocalisation_candidates", [](auto& o) { o.relocalisation_candidates = 0; }}});
 }

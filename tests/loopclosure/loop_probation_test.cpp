@@ -51,7 +51,7 @@ TEST_F(LoopProbationTest, AWrongOneFindsNoWitness) {
   EXPECT_TRUE(probation_.confirms(loop(4, 14), graph_)) << "whom the wrong ones do not hold up";
 }
 
-TEST_F(LoopProbationTest, ARoughOneIsNoWitnessAndNotHeldForEver) {
+TEST_F(LoopProbationTest, ARoughOneIsNoWitness) {
   probation_.hold(loop(1, 11));
   EXPECT_FALSE(probation_.confirms(loop(3, 12), graph_));
   EXPECT_TRUE(probation_.confirms(loop(3, 13), graph_));
