@@ -183,8 +183,8 @@ RefinementOutcome LoopCloser::refine(const GraphSnapshot& graph, KeyframeId k, c
       return seen;
     }
   }
-  return refinement_.refine(graph, k, images, T_c_k,
-                            result);  // once more: what it found last is the answer's
+  // Once more, so that what the refinement found last is the answer's.
+  return refinement_.refine(graph, k, images, T_c_k, result);
 }
 
 /// What lengths around the keyframe at hand measure over what they measure around the place (the inverse

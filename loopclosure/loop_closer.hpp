@@ -32,9 +32,9 @@ struct LoopCloserOptions {
   /// Of the points that a loop explains beside where the map has the camera: if as many are found from there
   /// on, that is where it is, in [0, 1].
   double as_mapped_share = 0.8;
-  /// Standard deviation of a loop's position within one part of the map, share of the scene's median depth, >
-  /// 0. Real loops were known to 0.0002 to 0.009 of it, also those that corrected metres; those beside the
-  /// truth to 0.01 to 0.04.
+  /// Standard deviation of a loop's position within one part of the map, > 0: share of the scene's median
+  /// depth. Real loops were known to 0.0002 to 0.009 of it, also those that corrected metres; those beside
+  /// the truth to 0.01 to 0.04.
   double max_sigma = 0.01;
   DepthRegressionOptions depths;  ///< of one camera's corners
   int min_scale_points = 12;      ///< that say how one camera's units differ; with fewer nobody knows, >= 1
