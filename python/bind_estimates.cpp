@@ -211,9 +211,9 @@ void bind_estimate(py::module_& module) {
           "(6,), read-only: linear [m/s] and angular [rad/s], in the camera's axes.")
       .def_readonly("map_version", &PoseEstimate::map_version,
                     "Version of the map that it was tracked against.")
-      .def_readonly(
-          "exposed_ns", &PoseEstimate::exposed_ns,
-          "When the frame was exposed, on CLOCK_MONOTONIC [ns]; without `live`, when the tracker took it.")
+      .def_readonly("exposed_ns", &PoseEstimate::exposed_ns,
+                    "When the frame was exposed, on CLOCK_MONOTONIC [ns]; without `live` or `speed`, when "
+                    "the tracker took it.")
       .def_readonly("latency_ns", &PoseEstimate::latency_ns,
                     "From then to the moment the pose was known [ns].")
       .def("__repr__", [](const PoseEstimate& pose) {

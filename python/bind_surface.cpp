@@ -91,7 +91,8 @@ void bind_mesh(py::module_& module) {
           "save", &save_mesh, py::arg("file"), py::arg("up") = std::array<double, 3>{0, -1, 0},
           py::call_guard<py::gil_scoped_release>(),
           "Writes a file of the kind that its name ends in: .ply, .obj or .glb, where `up` (unit) becomes y, "
-          "which is up there.\nRaises RuntimeError when it cannot.")
+          "which is up there.\nRaises RuntimeError when it cannot, ValueError for other names and for a .glb "
+          "without triangles.")
       .def("__repr__", [](const SurfaceMesh& self) {
         return fmt::format("<SurfaceMesh: {} triangles>", self.triangles.size());
       });

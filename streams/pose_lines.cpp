@@ -66,10 +66,10 @@ std::string json_event(const MapEvent& event) {
       R"("position":[{}],"orientation":[{}],"loop_from":{},"loop_to":{},"keyframes_moved":{},)"
       R"("farthest_moved":{:.6g},"most_turned":{:.6g}}})"
       "\n",
-      to_string(event.kind), event.frame, event.t_ns, event.map_version, event.keyframe,
-      event.map_part_before, event.map_part, event.moved, event.turned, list(before.t), list(before.q),
-      list(after.t), list(after.q), id_or_null(event.loop_from), id_or_null(event.loop_to),
-      event.keyframes_moved, event.farthest_moved, event.most_turned);
+      to_string(event.kind), event.frame, event.t_ns, event.map_version, id_or_null(event.keyframe),
+      id_or_null(event.map_part_before), id_or_null(event.map_part), event.moved, event.turned,
+      list(before.t), list(before.q), list(after.t), list(after.q), id_or_null(event.loop_from),
+      id_or_null(event.loop_to), event.keyframes_moved, event.farthest_moved, event.most_turned);
 }
 
 }  // namespace

@@ -180,7 +180,7 @@ class PoseEstimate:
         """Version of the map that it was tracked against."""
     @property
     def exposed_ns(self) -> int:
-        """When the frame was exposed, on CLOCK_MONOTONIC [ns]; without `live`, when the tracker took it."""
+        """When the frame was exposed, on CLOCK_MONOTONIC [ns]; without `live` or `speed`, when the tracker took it."""
     @property
     def latency_ns(self) -> int:
         """From then to the moment the pose was known [ns]."""
@@ -642,7 +642,7 @@ class SurfaceMesh:
         """(M, 3) uint32: numbers of their corners."""
     def save(self, file: str | PathLike[str], up: ArrayLike = ...) -> None:
         """Writes a file of the kind that its name ends in: .ply, .obj or .glb, where `up` (unit) becomes y, which is up
-        there. Raises RuntimeError when it cannot.
+        there. Raises RuntimeError when it cannot, ValueError for other names and for a .glb without triangles.
         """
 
 class DistanceField:

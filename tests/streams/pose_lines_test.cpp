@@ -94,6 +94,9 @@ TEST(PoseLines, EventsSayWhatMovedAndByHowMuch) {
   EXPECT_EQ(line["farthest_moved"], 2.5);
   EXPECT_EQ(line["position"], json({1.0, 2.0, 3.0}));
   EXPECT_EQ(event_line(event, PoseForm::kTum).substr(0, 24), "# loop closure at frame ");
+  const json nothing = json::parse(event_line(MapEvent{}, PoseForm::kJson));
+  for (const char* id : {"keyframe", "map_part_before", "map_part", "loop_from", "loop_to"})
+    EXPECT_TRUE(nothing[id].is_null()) << id;
   EXPECT_EQ(json::parse(missed_line(4, PoseForm::kJson))["missed"], 4);
 }
 
